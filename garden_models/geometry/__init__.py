@@ -1,0 +1,1 @@
+"""Rotations, the Gravity-View frame, cameras, similarity alignment, planes and peaks."""
