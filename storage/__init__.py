@@ -1,0 +1,47 @@
+"""Keep artifacts: hash, publish, read, verify, collect.
+
+    from storage import Store
+
+    store = Store.open("store")
+    published = store.publish(value)              # any frozen dataclass of arrays
+    same = store.read(published.object, type(value))
+
+Importing this package loads neither numpy, zarr nor pyarrow: look-ups need only JSON.
+"""
+
+from storage.actions import ActionRecord, Output
+from storage.check import Problem
+from storage.errors import (
+    CorruptArtifact,
+    MissingArtifact,
+    SchemaMismatch,
+    StoreError,
+    StoreFormatError,
+    StoreFull,
+    StoreMissing,
+    StoreReadOnly,
+    Unstorable,
+)
+from storage.manifest import Manifest
+from storage.objects import Published
+from storage.source import SourceFile
+from storage.store import Store
+
+__all__ = [
+    "ActionRecord",
+    "CorruptArtifact",
+    "Manifest",
+    "MissingArtifact",
+    "Output",
+    "Problem",
+    "Published",
+    "SchemaMismatch",
+    "SourceFile",
+    "Store",
+    "StoreError",
+    "StoreFormatError",
+    "StoreFull",
+    "StoreMissing",
+    "StoreReadOnly",
+    "Unstorable",
+]

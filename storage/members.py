@@ -1,0 +1,99 @@
+"""Write and read the files of one object, each checked against its manifest."""
+
+from __future__ import annotations
+
+import os
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from storage import _os
+from storage.digest import digest_bytes
+from storage.errors import CorruptArtifact
+from storage.manifest import Manifest, Member
+
+_SYNCING_THREADS = 8
+
+
+class MemberWriter:
+    """Collect the members of an object in a staging folder (thread-safe)."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.members: dict[str, Member] = {}
+        self._guard = threading.Lock()
+
+    def put(self, path: str, data: bytes | memoryview) -> None:
+        """Write one member, once."""
+        target = self.folder / path
+        _os.ensure_folder(target.parent, durable=False)
+        _os.active.write(target, data)
+        member = Member(memoryview(data).nbytes, digest_bytes(data))
+        with self._guard:
+            self.members[path] = member
+
+    def sync(self) -> None:
+        """Make all members durable; at once, since the disk then waits only once for many."""
+        paths = [self.folder / path for path in self.members]
+        with ThreadPoolExecutor(_SYNCING_THREADS, "fsync") as pool:
+            list(pool.map(_os.active.fsync, paths))
+
+
+class MemberReader:
+    """Read the members of a published object; what differs from the manifest raises."""
+
+    def __init__(self, folder: Path, digest: str, manifest: Manifest) -> None:
+        self.digest = digest
+        self.manifest = manifest
+        self._folder = folder
+        self._hashed: set[str] = set()
+
+    def __contains__(self, path: str) -> bool:
+        return path in self.manifest.members
+
+    def get(self, path: str) -> bytes:
+        """Return a whole member, hashed against the manifest.
+
+        Raises:
+            CorruptArtifact: it is missing or has changed.
+        """
+        member = self.manifest.members.get(path)
+        if member is None:
+            raise CorruptArtifact(self.digest, f"{path} is no member")
+        try:
+            data = (self._folder / path).read_bytes()
+        except OSError as error:
+            raise CorruptArtifact(self.digest, f"member {path} cannot be read") from error
+        if len(data) != member.size or digest_bytes(data) != member.digest:
+            raise CorruptArtifact(self.digest, f"member {path} has changed")
+        self._hashed.add(path)
+        return data
+
+    def check_rest(self) -> None:
+        """Hash the members that were not read whole so far.
+
+        Raises:
+            CorruptArtifact: one of them is missing or has changed.
+        """
+        for path in self.manifest.members.keys() - self._hashed:
+            self.get(path)
+
+    def get_range(self, path: str, start: int, stop: int) -> bytes:
+        """Return the bytes ``start:stop`` of a member, whose own checksums must hold them.
+
+        Raises:
+            CorruptArtifact: the member is missing or shorter than the manifest says.
+        """
+        member = self.manifest.members[path]
+        stop = min(stop, member.size)
+        try:
+            descriptor = os.open(self._folder / path, os.O_RDONLY | os.O_CLOEXEC)
+        except OSError as error:
+            raise CorruptArtifact(self.digest, f"member {path} cannot be read") from error
+        try:
+            data = os.pread(descriptor, stop - start, start)
+        finally:
+            os.close(descriptor)
+        if len(data) != stop - start:
+            raise CorruptArtifact(self.digest, f"member {path} is too short")
+        return data

@@ -1,0 +1,334 @@
+"""Take one call from its key to its reference: look up, wait, compute, record, explain."""
+
+from __future__ import annotations
+
+import dataclasses
+import errno
+import random
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from garden_models.scene import BadGeometry, BadInput
+from storage import ActionRecord, Output, StoreError
+from tasks.step_compute import Done, compute
+from tasks.step_inputs import Arguments, each
+from tasks.step_key import KeyParts, explain
+from tasks.step_ref import (
+    Cancelled,
+    MemoryLimit,
+    Outcome,
+    PlanAction,
+    PlanEntry,
+    Ref,
+    Seconds,
+    StepCrashed,
+    StepEvent,
+    StepFailed,
+    TimeLimit,
+    Why,
+    step_name,
+)
+from tasks.step_run import RunContext
+
+if TYPE_CHECKING:
+    from tasks.step import Step
+
+_SPEAKING = (
+    BadInput,
+    BadGeometry,
+    StoreError,
+    StepFailed,
+    TimeLimit,
+    MemoryLimit,
+    StepCrashed,
+    Cancelled,
+)
+HIT = Why("hit", "found in the store")
+LONGEST_WAIT_S = 6 * 3600.0
+_POLL_S = (0.05, 1.0)
+_BACK_OFF_S = 0.5
+_TRANSIENT = {
+    errno.EIO,
+    errno.EAGAIN,
+    errno.EINTR,
+    errno.EBUSY,
+    errno.ESTALE,
+    errno.EMFILE,
+    errno.ENFILE,
+    errno.ENOMEM,
+    errno.ETIMEDOUT,
+    errno.ECONNRESET,
+    errno.ECONNREFUSED,
+    errno.EPIPE,
+}
+
+
+@dataclass(frozen=True)
+class Call:
+    """One call of a step in a run."""
+
+    context: RunContext
+    step: Step
+    arguments: Arguments
+    label: str
+
+    @property
+    def name(self) -> str:
+        """The step with its target."""
+        return step_name(self.step.name, self.label)
+
+
+def plan(call: Call) -> Ref:
+    """Say what a run would do, and do nothing."""
+    context = call.context
+    if pending := call.arguments.pending:
+        upstream = sorted(
+            {ref.step for name in pending for ref in each(call.arguments.refs[name]) if ref.pending}
+        )
+        why = Why("upstream", f"{' and '.join(upstream)} would run first")
+        return _planned(call, None, why, key="")
+    parts = call.step.key_parts(call.arguments)
+    forced = context.is_forced(call.step.name, call.name)
+    record, reason = context.store.lookup(parts.key, mend=False)
+    if record is not None and not forced:
+        return _planned(call, record, HIT, key=parts.key)
+    return _planned(call, None, _why(call, parts, reason, forced), key=parts.key)
+
+
+def _planned(call: Call, record: ActionRecord | None, why: Why, key: str) -> Ref:
+    if record is None:
+        ref = Ref(
+            call.step.returns, "", "", key, call.step.name, call.label, outcome="pending", why=why
+        )
+    else:
+        ref = _ref(call, record, "cached", why)
+    action: PlanAction = "would run" if record is None else "cached"
+    call.context.add_plan(PlanEntry(call.step.name, call.label, action, why, ref))
+    return ref
+
+
+def execute(call: Call, lost: str = "") -> Ref:
+    """Return the call's result from the store, or make it.
+
+    ``lost`` says how an earlier result went, if the caller knows: corrupt or evicted.
+
+    Raises:
+        StepFailed: there is none, and why.
+    """
+    context, step = call.context, call.step
+    started = time.monotonic()
+    why = None
+    try:
+        _stop_if_cancelled(context)
+        parts = step.key_parts(call.arguments)
+        forced = context.is_forced(step.name, call.name)
+        record, reason = (None, "absent") if forced else context.store.lookup(parts.key)
+        if record is not None:
+            return _hit(call, record, Seconds())
+        why = _why(call, parts, lost or reason, forced)
+        with _single_flight(call, parts.key, forced) as found:
+            waited = time.monotonic() - started
+            if found is not None:
+                return _hit(call, found, Seconds(wait=waited))
+            return _make(call, parts, why, waited)
+    except Exception as error:
+        failure = _failure(call, error)
+        seconds = Seconds(compute=time.monotonic() - started)
+        _finished(call, "failed", seconds, why=why, error=failure.reason)
+        raise failure from error
+
+
+def _hit(call: Call, record: ActionRecord, seconds: Seconds) -> Ref:
+    call.context.store.remember_latest(record, call.context.scene, call.label)
+    ref = _ref(call, record, "cached", HIT)
+    _remember_producer(call, ref)
+    _finished(call, "cached", seconds, ref=ref)
+    return ref
+
+
+def _make(call: Call, parts: KeyParts, why: Why, waited: float) -> Ref:
+    context, step = call.context, call.step
+    context.emit(_event(call, "started", why=why))
+    started = time.time()
+    done, attempt = _with_retries(call)
+    published = done.published
+    recording = time.monotonic()
+    record = ActionRecord(
+        key=parts.key,
+        step=step.name,
+        scene=context.scene,
+        label=call.label,
+        outputs={
+            "value": Output(published.object, published.content, published.kind, published.bytes)
+        },
+        verdict={"status": done.verdict.status, "reasons": list(done.verdict.reasons)},
+        seconds=dataclasses.asdict(dataclasses.replace(done.seconds, wait=waited)),
+        peak_mb=round(done.peak_mb, 1),
+        started=started,
+        parts=parts.to_json(),
+        backend=parts.backend,
+        host=socket.gethostname(),
+        run_id=context.run_id,
+        attempt=attempt,
+        why=dataclasses.asdict(why),
+    )
+    counted = context.store.record(record)
+    context.store.remember_latest(counted, context.scene, call.label)
+    publish = done.seconds.publish + time.monotonic() - recording
+    seconds = dataclasses.replace(done.seconds, publish=publish, wait=waited)
+    ref = _ref(call, counted, "executed", why)
+    if not counted.same_outputs(record):
+        note = "made again and came out different; the first result counts"
+        ref = dataclasses.replace(ref, reasons=(*ref.reasons, note))
+    _remember_producer(call, ref)
+    _finished(call, "executed", seconds, ref=ref, peak_mb=done.peak_mb)
+    return ref
+
+
+def _with_retries(call: Call) -> tuple[Done, int]:
+    """Compute; try again after faults that may pass, and once after a damaged input."""
+    attempt = 1
+    while True:
+        try:
+            return _compute(call), attempt
+        except (OSError, MemoryError) as error:
+            if not is_transient(error) or attempt > call.step.spec.retries:
+                raise
+        pause = _BACK_OFF_S * 2 ** (attempt - 1) * random.uniform(0.5, 1.5)
+        call.context.cancelled.wait(pause)
+        _stop_if_cancelled(call.context)
+        attempt += 1
+
+
+def _compute(call: Call) -> Done:
+    def report(share: float, doing: str) -> None:
+        call.context.emit(_event(call, "progress", share=share, doing=doing))
+
+    if call.step.spec.isolated and call.context.isolate:
+        from tasks.step_isolate import compute_isolated
+
+        return compute_isolated(call.context, call.step, call.arguments, call.label, report)
+    return compute(call.context, call.step, call.arguments, report)
+
+
+def is_transient(error: BaseException) -> bool:
+    """Tell whether the same call may well succeed a moment later."""
+    if isinstance(error, MemoryError | ConnectionError | TimeoutError):
+        return True
+    return isinstance(error, OSError) and error.errno in _TRANSIENT
+
+
+def _stop_if_cancelled(context: RunContext) -> None:
+    if context.cancelled.is_set():
+        raise Cancelled("the run was stopped")
+
+
+def _failure(call: Call, error: Exception) -> StepFailed:
+    """Return a step's error as the user shall read it; its own sentence if it has one."""
+    if isinstance(error, StepFailed) and error.step == call.step.name:
+        return error
+    kind = type(error).__name__
+    if isinstance(error, _SPEAKING):
+        reason = str(error)
+    elif isinstance(error, MemoryError):
+        reason = "out of memory: close other programs or choose a smaller image size"
+    else:
+        reason = f"{kind}: {error}"
+    return StepFailed(call.step.name, call.label, reason, kind=kind, retryable=is_transient(error))
+
+
+@contextmanager
+def _single_flight(call: Call, key: str, forced: bool) -> Iterator[ActionRecord | None]:
+    """Become the one that computes ``key`` (gives None), or give what another one found.
+
+    Whoever holds the lease dies with it; whoever waits takes over. After a bounded wait
+    the step is computed anyway: the first result counts.
+    """
+    store = call.context.store
+    deadline = time.monotonic() + LONGEST_WAIT_S
+    pause = _POLL_S[0]
+    while (lease := store.acquire(key)) is None and time.monotonic() < deadline:
+        call.context.cancelled.wait(pause)
+        _stop_if_cancelled(call.context)
+        pause = min(2 * pause, _POLL_S[1])
+        if not forced:
+            record, _reason = store.lookup(key)
+            if record is not None:
+                yield record
+                return
+    try:
+        yield None if forced else store.lookup(key)[0]
+    finally:
+        if lease is not None:
+            store.leases.release(lease)
+
+
+def _why(call: Call, parts: KeyParts, reason: str, forced: bool) -> Why:
+    if forced:
+        return Why("forced", "asked for by the user")
+    if reason == "corrupt":
+        return Why("corrupt", "its stored result was damaged")
+    if reason == "evicted":
+        return Why("evicted", "its result is no longer in the store")
+    last = call.context.store.latest(call.context.scene, call.step.name, call.label)
+    return explain(parts, None if last is None else last.parts)
+
+
+def _remember_producer(call: Call, ref: Ref) -> None:
+    """Keep how to make a result again, should it turn out to be damaged when read."""
+    call.context.producers[ref.object] = lambda lost: execute(call, lost)
+
+
+def _ref(call: Call, record: ActionRecord, outcome: Outcome, why: Why) -> Ref:
+    output = record.outputs["value"]
+    return Ref(
+        kind=output.kind,
+        content=output.content,
+        object=output.object,
+        key=record.key,
+        step=call.step.name,
+        label=call.label,
+        status=record.verdict["status"],
+        reasons=tuple(record.verdict["reasons"]),
+        outcome=outcome,
+        backend=record.backend,
+        why=why,
+        seconds=Seconds(**record.seconds),
+        peak_mb=record.peak_mb,
+        bytes=output.bytes,
+    )
+
+
+def _event(call: Call, kind: Any, **values: Any) -> StepEvent:
+    return StepEvent(kind, call.step.name, call.label, call.context.scene, time.time(), **values)
+
+
+def _finished(
+    call: Call,
+    outcome: Any,
+    seconds: Seconds,
+    *,
+    ref: Ref | None = None,
+    why: Why | None = None,
+    peak_mb: float = 0.0,
+    error: str = "",
+) -> None:
+    call.context.emit(
+        _event(
+            call,
+            "finished",
+            outcome=outcome,
+            backend=ref.backend if ref else "",
+            seconds=seconds,
+            peak_mb=peak_mb,
+            status=ref.status if ref else "failed",
+            reasons=ref.reasons if ref else (error,),
+            why=ref.why if ref else why,
+            ref=ref,
+            error=error,
+        )
+    )

@@ -1,0 +1,220 @@
+"""Compute a step in a child process that can be stopped, whatever it is doing.
+
+The child loads its inputs from the store and publishes its result itself; only JSON goes
+between the two. It is killed with all its children when it runs too long, takes too much
+memory, or the run is stopped, and it dies with its parent.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from garden_models import scene
+from storage import CorruptArtifact, Published, errors
+from tasks.step_compute import Done
+from tasks.step_inputs import Arguments
+from tasks.step_memory import Peak, session_rss
+from tasks.step_ref import Cancelled, MemoryLimit, Seconds, StepCrashed, TimeLimit
+from tasks.step_run import RunContext
+from tasks.step_wire import plain_to_json, refs_to_json
+
+if TYPE_CHECKING:
+    from tasks.step import Step
+
+_POLL_S = 0.1
+_WEIGH_EVERY_S = 0.3
+_TAIL_BYTES = 2000
+
+
+def compute_isolated(
+    context: RunContext,
+    step: Step,
+    arguments: Arguments,
+    label: str,
+    report: Callable[[float, str], None],
+) -> Done:
+    """Compute a step in a child process and return what it published.
+
+    Raises:
+        TimeLimit, MemoryLimit: it was killed for that.
+        StepCrashed: it died by itself, or raised an error of an unknown kind.
+        Cancelled: the run was stopped.
+        BadInput, BadGeometry, MemoryError, OSError, StoreError: as raised in the child.
+    """
+    order = _order(context, step, arguments, label)
+    with context.store.scratch() as folder, _child(folder, order) as child:
+        answer = _listen(context, step, child, report)
+    if "error" in answer:
+        raise _rebuild(answer["error"])
+    done = answer["done"]
+    return Done(
+        Published(**done["published"]),
+        scene.Verdict(done["verdict"]["status"], tuple(done["verdict"]["reasons"])),
+        Seconds(**done["seconds"]),
+        max(child.peak.mb, done["peak_mb"]),
+    )
+
+
+def _order(context: RunContext, step: Step, arguments: Arguments, label: str) -> dict[str, Any]:
+    return {
+        "module": step.fn.__module__,
+        "name": step.fn.__qualname__,
+        "label": label,
+        "code": step.code().digest,
+        "store": str(context.store.path),
+        "durability": "full" if context.store.durable else "none",
+        "verify": context.store.verify_level,
+        "scene": context.scene,
+        "run_id": context.run_id,
+        "plain": {name: plain_to_json(value) for name, value in arguments.plain.items()},
+        "refs": {name: refs_to_json(value) for name, value in arguments.refs.items()},
+        "path": sys.path,
+    }
+
+
+@dataclass
+class _Child:
+    process: subprocess.Popen[bytes]
+    answers: int  # descriptor of the pipe on which the child speaks
+    output: Path  # what it, and its libraries, print
+    started: float = field(default_factory=time.monotonic)
+    peak: Peak = field(default_factory=Peak)
+    weigh_at: float = 0.0  # when its memory is looked at next
+    buffer: bytes = b""
+    silent: bool = False  # it has closed its end of the pipe
+
+    def tail(self) -> str:
+        """Return the end of what the child printed."""
+        try:
+            return self.output.read_bytes()[-_TAIL_BYTES:].decode(errors="replace").strip()
+        except OSError:
+            return ""
+
+    def kill(self) -> None:
+        """End the child and all that it started."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.wait()
+
+
+@contextmanager
+def _child(folder: Path, order: dict[str, Any]) -> Iterator[_Child]:
+    reading, writing = os.pipe()
+    output = folder / "output.txt"
+    (folder / "order.json").write_text(json.dumps(order))
+    command = [sys.executable, "-m", "tasks.step_child"]
+    command += [str(writing), str(os.getpid()), str(folder / "order.json")]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    try:
+        with output.open("wb") as printed:
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=printed,
+                stderr=subprocess.STDOUT,
+                pass_fds=(writing,),
+                start_new_session=True,
+                env=environment,
+            )
+    finally:
+        os.close(writing)
+    child = _Child(process, reading, output)
+    try:
+        yield child
+    finally:
+        child.kill()
+        os.close(reading)
+
+
+def _listen(
+    context: RunContext, step: Step, child: _Child, report: Callable[[float, str], None]
+) -> dict[str, Any]:
+    """Pass on progress until the child gives its answer; kill it when it must end."""
+    while True:
+        for message in _messages(child):
+            if "progress" in message:
+                report(*message["progress"])
+            else:
+                return message
+        if child.silent:
+            raise StepCrashed(_how_it_died(child))
+        _check_limits(context, step, child)
+
+
+def _messages(child: _Child) -> Iterator[dict[str, Any]]:
+    ready, _, _ = select.select([child.answers], [], [], _POLL_S)
+    if not ready:
+        return
+    data = os.read(child.answers, 1 << 16)
+    if not data:
+        child.silent = True
+        return
+    *lines, child.buffer = (child.buffer + data).split(b"\n")
+    for line in lines:
+        yield json.loads(line)
+
+
+def _check_limits(context: RunContext, step: Step, child: _Child) -> None:
+    if context.cancelled.is_set():
+        raise Cancelled("the run was stopped")
+    limit_s, limit_gb = step.spec.time_limit_s, step.spec.memory_limit_gb
+    now = time.monotonic()
+    if limit_s is not None and now - child.started > limit_s:
+        raise TimeLimit(
+            f"stopped after {limit_s:g} s, its time limit: use fewer or smaller photos,"
+            " or raise the limit"
+        )
+    if now < child.weigh_at:
+        return
+    child.weigh_at = now + _WEIGH_EVERY_S
+    child.peak.see(session_rss(child.process.pid))
+    if limit_gb is not None and child.peak.mb > limit_gb * 1000:
+        raise MemoryLimit(
+            f"stopped at {child.peak.mb / 1000:.1f} GB, above its memory limit of"
+            f" {limit_gb:g} GB: use fewer or smaller photos, or raise the limit"
+        )
+
+
+def _how_it_died(child: _Child) -> str:
+    try:
+        code = child.process.wait(timeout=5.0)
+    except subprocess.TimeoutExpired:
+        return "its process closed the connection without a result"
+    if code < 0:
+        how = f"its process was ended by {signal.Signals(-code).name}"
+    else:
+        how = f"its process ended with code {code} and no result"
+    tail = child.tail()
+    return f"{how}; it printed last: {tail}" if tail else how
+
+
+def _rebuild(error: dict[str, Any]) -> Exception:
+    """Return the child's error; unknown kinds become StepCrashed with their traceback."""
+    kind, message = error["kind"], error["message"]
+    if kind in ("BadInput", "BadGeometry"):
+        cls: type[Exception] = getattr(scene, kind)
+        return cls(message)
+    if kind == "CorruptArtifact":
+        return CorruptArtifact(error["object"], error["reason"])
+    if kind in ("StoreFull", "StoreReadOnly", "Unstorable", "SchemaMismatch", "MissingArtifact"):
+        store_error: type[Exception] = getattr(errors, kind)
+        return store_error(message)
+    if kind == "MemoryError":
+        return MemoryError(message)
+    if error.get("errno") is not None:
+        return OSError(error["errno"], message)
+    crashed = StepCrashed(f"{kind}: {message}")
+    crashed.add_note(error["traceback"])
+    return crashed

@@ -1,0 +1,155 @@
+"""Carry what all steps of one run share: the store, the scene, the engine, the listeners."""
+
+from __future__ import annotations
+
+import contextlib
+import contextvars
+import signal
+import threading
+import uuid
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import FrameType
+from typing import Any, Literal, TypeVar
+
+from storage import Store
+from tasks.step_ref import PendingValue, PlanEntry, Ref, StepEvent
+
+Engine = Literal["prefect", "local", "plan"]
+T = TypeVar("T")
+
+
+def ignore_event(event: StepEvent) -> None:
+    """Tell nobody."""
+
+
+@dataclass
+class RunContext:
+    """One run over one scene.
+
+    ``force`` names steps (``segment`` or ``segment[bulldozer]``, ``*`` for all) that run
+    even on a hit. ``workers`` bounds the steps that the local engine runs at once.
+    ``isolate=False`` runs isolated steps in this process (for tests). ``outcomes`` and
+    ``plan`` are filled as steps finish.
+    """
+
+    store: Store
+    scene: str
+    engine: Engine = "local"
+    events: Callable[[StepEvent], None] = ignore_event
+    force: frozenset[str] = frozenset()
+    workers: int = 2
+    isolate: bool = True
+    run_id: str = field(default_factory=lambda: uuid.uuid4().hex[:12])
+    outcomes: list[StepEvent] = field(default_factory=list)
+    plan: list[PlanEntry] = field(default_factory=list)
+    cancelled: threading.Event = field(default_factory=threading.Event)
+    producers: dict[str, Callable[[str], Ref]] = field(default_factory=dict)
+    _guard: threading.RLock = field(default_factory=threading.RLock)
+
+    def emit(self, event: StepEvent) -> None:
+        """Pass an event on, one at a time."""
+        with self._guard:
+            if event.kind == "finished":
+                self.outcomes.append(event)
+            self.events(event)
+
+    def add_plan(self, entry: PlanEntry) -> None:
+        """Note what a run would do with a step."""
+        with self._guard:
+            self.plan.append(entry)
+
+    def is_forced(self, step: str, name: str) -> bool:
+        """Tell whether the user asked for this step to run again."""
+        return bool(self.force & {"*", step, name})
+
+
+_current: contextvars.ContextVar[RunContext] = contextvars.ContextVar("garden_run")
+_scratch: contextvars.ContextVar[Store] = contextvars.ContextVar("garden_scratch")
+
+
+def current_run() -> RunContext:
+    """Return the run that this code is part of; LookupError outside of one."""
+    try:
+        return _current.get()
+    except LookupError:
+        raise LookupError(
+            "a step was called outside of a run: use `with run_context(RunContext(...)):`,"
+            " or call its pure function as `step.fn(...)`"
+        ) from None
+
+
+@contextmanager
+def run_context(context: RunContext) -> Iterator[RunContext]:
+    """Make ``context`` the run of all steps called inside.
+
+    In the main thread Ctrl-C and SIGTERM also stop isolated children and waiting steps.
+    """
+    token = _current.set(context)
+    try:
+        with _stopping(context):
+            yield context
+    except BaseException:
+        context.cancelled.set()
+        raise
+    finally:
+        _current.reset(token)
+
+
+@contextmanager
+def _stopping(context: RunContext) -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with contextlib.ExitStack() as stack:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            previous = signal.getsignal(number)
+            stack.callback(signal.signal, number, previous)
+            signal.signal(number, _stopper(context, previous))
+        yield
+
+
+def _stopper(context: RunContext, previous: Any) -> Callable[[int, FrameType | None], None]:
+    def stop(number: int, frame: FrameType | None) -> None:
+        context.cancelled.set()
+        if callable(previous):
+            previous(number, frame)
+        elif previous == signal.SIG_DFL:
+            raise SystemExit(128 + number)
+
+    return stop
+
+
+def load(ref: Ref | Future[Ref], expected: type[T], fields: tuple[str, ...] = ()) -> Any:
+    """Return the value behind a reference, or a dict of some of its fields, verified.
+
+    Raises:
+        PendingValue: a plan has no values of steps that would run first.
+        CorruptArtifact: it was damaged, and what made it is not part of this run.
+    """
+    from tasks.step_inputs import load_ref
+
+    known = ref if isinstance(ref, Ref) else ref.result()
+    if known.pending:
+        raise PendingValue(f"{known.kind} of {known.step} is not known before it has run")
+    return load_ref(current_run(), known, expected, fields)
+
+
+@contextmanager
+def step_scratch() -> Iterator[Path]:
+    """Give a folder for libraries that need files; it is removed at the end.
+
+    It lies on the store's disk during a run, else in the system's temporary folder.
+    """
+    context = _current.get(None)
+    if context is not None:
+        with context.store.scratch() as folder:
+            yield folder
+        return
+    import tempfile
+
+    with tempfile.TemporaryDirectory(prefix="garden-") as name:
+        yield Path(name)
