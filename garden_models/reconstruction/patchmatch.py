@@ -1,0 +1,143 @@
+"""Improve plane hypotheses per pixel: take over neighbours' planes, then vary one's own.
+
+PatchMatch stereo (Bleyer et al. 2011) with all pixels updated at once and, per direction,
+only the neighbour that matches best tried (Xu and Tao 2019), which suits array code.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from garden_models.reconstruction.patch_cost import PatchCost, Planes
+
+DIRECTIONS: tuple[tuple[tuple[int, int], ...], ...] = (
+    ((-1, 0), (-3, 0), (-5, -1), (-5, 1)),
+    ((1, 0), (3, 0), (5, -1), (5, 1)),
+    ((0, -1), (0, -3), (-1, -5), (1, -5)),
+    ((0, 1), (0, 3), (-1, 5), (1, 5)),
+)
+"""Offsets (dx, dy) of the neighbours considered, by direction."""
+
+
+@dataclass(frozen=True)
+class Matched:
+    """Each pixel's best plane so far and its cost, as images."""
+
+    planes: Planes
+    cost: Float[Tensor, "h w"]
+
+
+def shifted(image: Float[Tensor, "h w"], dx: int, dy: int) -> Float[Tensor, "h w"]:
+    """Return ``out[y, x] = image[y + dy, x + dx]``, the border repeated."""
+    height, width = image.shape
+    reach = max(abs(dx), abs(dy))
+    padded = F.pad(image[None, None], (reach,) * 4, mode="replicate")[0, 0]
+    return padded[reach + dy : reach + dy + height, reach + dx : reach + dx + width]
+
+
+def neighbour_planes(matched: Matched, direction: tuple[tuple[int, int], ...]) -> Planes:
+    """Return, at each pixel, the plane of its cheapest neighbour in a direction, extended
+    to the pixel.
+    """
+    planes = matched.planes
+    best = torch.full_like(matched.cost, torch.inf)
+    w, gx, gy = planes.w, planes.gx, planes.gy
+    for dx, dy in direction:
+        their_cost = shifted(matched.cost, dx, dy)
+        their_gx, their_gy = shifted(planes.gx, dx, dy), shifted(planes.gy, dx, dy)
+        better = their_cost < best
+        best = torch.where(better, their_cost, best)
+        extended = shifted(planes.w, dx, dy) - their_gx * dx - their_gy * dy
+        w = torch.where(better, extended, w)
+        gx = torch.where(better, their_gx, gx)
+        gy = torch.where(better, their_gy, gy)
+    return Planes(w, gx, gy)
+
+
+def start(planes: Planes, patch_cost: PatchCost) -> Matched:
+    """Cost the planes that a level starts from (all pixels)."""
+    return Matched(planes, patch_cost(planes.flat()).view_as(planes.w))
+
+
+def attempt(
+    matched: Matched, rival: Planes, patch_cost: PatchCost, limits: tuple[float, float]
+) -> Matched:
+    """Keep, per pixel that ``patch_cost`` covers, the cheaper of two planes.
+
+    ``rival`` is whole images; values outside ``limits`` (far, near inverse depth) are moved
+    to the limit.
+    """
+    rival = Planes(rival.w.clamp(*limits), rival.gx, rival.gy)
+    index = patch_cost.index
+    if index is None:
+        cost = patch_cost(rival.flat()).view_as(matched.cost)
+    else:
+        cost = torch.full_like(matched.cost, torch.inf)
+        cost.view(-1)[index] = patch_cost(rival.at(index))
+    better = cost < matched.cost
+    planes = matched.planes
+    kept = Planes(
+        torch.where(better, rival.w, planes.w),
+        torch.where(better, rival.gx, planes.gx),
+        torch.where(better, rival.gy, planes.gy),
+    )
+    return Matched(kept, torch.minimum(cost, matched.cost))
+
+
+def propagate(matched: Matched, patch_cost: PatchCost, limits: tuple[float, float]) -> Matched:
+    """Try the best neighbour's plane of each direction."""
+    for direction in DIRECTIONS:
+        matched = attempt(matched, neighbour_planes(matched, direction), patch_cost, limits)
+    return matched
+
+
+def vary(
+    matched: Matched,
+    patch_cost: PatchCost,
+    limits: tuple[float, float],
+    step_w: Float[Tensor, "h w"],
+    step_slope: Float[Tensor, "h w"],
+    generator: torch.Generator,
+) -> Matched:
+    """Try one random change of value and slopes within the given steps."""
+    planes = matched.planes
+    noise = torch.rand((3, *planes.w.shape), generator=generator) * 2 - 1
+    noise = noise.to(planes.w.device)
+    rival = Planes(
+        planes.w + noise[0] * step_w,
+        planes.gx + noise[1] * step_slope,
+        planes.gy + noise[2] * step_slope,
+    )
+    return attempt(matched, rival, patch_cost, limits)
+
+
+def refine_value(
+    matched: Matched,
+    patch_cost: PatchCost,
+    limits: tuple[float, float],
+    step_w: Float[Tensor, "h w"],
+) -> Matched:
+    """Move each value to the lowest point of the parabola through three costs."""
+    planes = matched.planes
+    lower = patch_cost(Planes(planes.w - step_w, planes.gx, planes.gy).flat())
+    upper = patch_cost(Planes(planes.w + step_w, planes.gx, planes.gy).flat())
+    lower, upper = lower.view_as(planes.w), upper.view_as(planes.w)
+    bend = lower + upper - 2 * matched.cost
+    shift = torch.where(bend > 1e-6, (lower - upper) / (2 * bend.clamp(min=1e-6)), 0.0)
+    rival = Planes(planes.w + shift.clamp(-1.0, 1.0) * step_w, planes.gx, planes.gy)
+    return attempt(matched, rival, patch_cost, limits)
+
+
+def choose_views(
+    patch_cost: PatchCost, planes: Planes, count: int
+) -> Int[Tensor, "slots h w"]:
+    """Return each pixel's ``count`` best partners, judged over its 3x3 surroundings."""
+    shape = planes.w.shape
+    costs = patch_cost.per_view(planes.flat()).view(-1, *shape)
+    costs = F.avg_pool2d(costs[None], 3, 1, 1, count_include_pad=False)[0]
+    return costs.topk(min(count, len(costs)), dim=0, largest=False).indices
