@@ -1,0 +1,61 @@
+"""Hold the settings of object placement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class PlaceObject:
+    """How an object's pose is searched and judged.
+
+    Lengths are shares of the object's size (the diagonal of its bounding box).
+    """
+
+    method: str = "render_and_compare"
+    """Name of the method (the embedded backend has this one)."""
+
+    max_views: int = 8
+    """Most views that are compared; spread around the object."""
+
+    pixels_per_view: int = 3600
+    """About how many pixels of each view are compared, spread over the object's box."""
+
+    refine_steps: int = 14
+    """Gauss-Newton steps of a refinement."""
+
+    yaw_starts: int = 24
+    """Headings tried around the vertical axis for meshes whose heading is not known."""
+
+    refined_starts: int = 3
+    """Most of those headings that are refined."""
+
+    depth_weight: float = 2.0
+    """Cost in mask IoU of a depth residual as large as the object."""
+
+    colour_weight: float = 0.4
+    """Cost in mask IoU of the largest possible colour difference."""
+
+    support_weight: float = 1.0
+    """Cost in mask IoU of a gap to the support as large as the object."""
+
+    least_gain: float = 0.004
+    """Gain in the total score under which the pose of the mesh's making is kept."""
+
+    least_iou: float = 0.6
+    """Mean mask IoU of the chosen pose below which the placement is degraded."""
+
+    most_depth_residual: float = 0.06
+    """Depth residual (share of the size) above which the placement is degraded."""
+
+    def __post_init__(self) -> None:
+        if self.max_views < 1 or self.pixels_per_view < 100:
+            raise ValueError(
+                "max_views must be at least 1 and pixels_per_view at least 100, got "
+                f"{self.max_views} and {self.pixels_per_view}"
+            )
+        if self.yaw_starts < 1 or self.refined_starts < 0 or self.refine_steps < 1:
+            raise ValueError(
+                "yaw_starts and refine_steps must be positive and refined_starts not negative, "
+                f"got {self.yaw_starts}, {self.refine_steps} and {self.refined_starts}"
+            )

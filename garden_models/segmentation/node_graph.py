@@ -1,0 +1,103 @@
+"""Join neighbouring points to a graph whose weak edges are where one thing ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.spatial import cKDTree
+
+from garden_models.scene import PointCloud
+
+NEIGHBOURS = 10
+SMOOTHING_PASSES = 2
+ALIKE_POWER = 8
+"""Neighbours 30 degrees apart smooth each other by a third, 60 degrees apart not at all."""
+
+
+@dataclass(frozen=True)
+class NodeGraph:
+    """Points (GV) with smoothed normals, and edges with weights in 0..1.
+
+    ``length`` is each edge's length in units of its points' spacing.
+    """
+
+    cloud: PointCloud
+    edges: Int[np.ndarray, "e 2"]
+    length: Float[np.ndarray, " e"]
+    weights: Float[np.ndarray, " e"]
+
+    def components(self, keep: Bool[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
+        """Number the connected parts of the kept points from 0; others get -1."""
+        inside = keep[self.edges].all(1)
+        i, j = self.edges[inside].T
+        count = len(self.cloud)
+        graph = sparse.coo_matrix((np.ones(len(i), np.int8), (i, j)), shape=(count, count))
+        _, labels = csgraph.connected_components(graph, directed=False)
+        out = np.full(count, -1)
+        if keep.any():
+            out[keep] = np.unique(labels[keep], return_inverse=True)[1].ravel()
+        return out
+
+
+def node_graph(
+    cloud: PointCloud, *, reach: float, colour_sigma: float, crease_deg: float
+) -> NodeGraph:
+    """Join each point to its nearest neighbours within ``reach`` spacings.
+
+    An edge is weaker the longer it is, the more its colours differ (``colour_sigma``: CIE
+    Lab units) and the deeper the crease between its points (``crease_deg``): where two
+    things touch, the surface is concave (Stein et al. 2014, "Object partitioning using
+    local convexity").
+    """
+    tree = cKDTree(cloud.xyz)
+    count = min(NEIGHBOURS + 1, len(cloud))
+    distance, index = tree.query(cloud.xyz, count, workers=2)
+    distance, index = distance.reshape(len(cloud), -1), index.reshape(len(cloud), -1)
+    first = np.repeat(np.arange(len(cloud)), index.shape[1])
+    second, flat = index.ravel(), distance.ravel()
+    limit = reach * np.maximum(cloud.spacing[first], cloud.spacing[second])
+    keep = (first != second) & (flat <= limit)
+    low, high = np.minimum(first, second)[keep], np.maximum(first, second)[keep]
+    _, unique = np.unique(low * len(cloud) + high, return_index=True)
+    edges = np.stack([low[unique], high[unique]], 1)
+    normal = _smoothed(cloud.normal, index)
+    span = cloud.xyz[edges[:, 1]] - cloud.xyz[edges[:, 0]]
+    length = flat[keep][unique] / np.maximum(cloud.spacing[edges].mean(1), 1e-12)
+
+    lab = lab_colours(cloud.rgb)
+    colour = np.linalg.norm(lab[edges[:, 0]] - lab[edges[:, 1]], axis=1)
+    n0, n1 = normal[edges[:, 0]], normal[edges[:, 1]]
+    concave = ((n1 - n0) * span).sum(1) < 0
+    bend = np.degrees(np.arccos(np.clip((n0 * n1).sum(1), -1, 1)))
+    weights = np.exp(
+        -((length / reach) ** 2)
+        - (colour / colour_sigma) ** 2
+        - np.where(concave, (bend / crease_deg) ** 2, 0.0)
+    )
+    smooth = PointCloud(cloud.xyz, cloud.rgb, normal, cloud.spacing, cloud.confidence)
+    return NodeGraph(smooth, edges, length, weights)
+
+
+def lab_colours(rgb: UInt8[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+    """Return CIE Lab colours (L 0..100, a and b about -100..100)."""
+    image = np.ascontiguousarray(rgb.reshape(1, -1, 3)).astype(np.float32) / 255
+    return cv2.cvtColor(image, cv2.COLOR_RGB2LAB).reshape(rgb.shape)
+
+
+def _smoothed(
+    normal: Float[np.ndarray, "n 3"], index: Int[np.ndarray, "n k"]
+) -> Float[np.ndarray, "n 3"]:
+    """Average normals over neighbours that face about the same way, so that creases stay."""
+    index = np.where(index < len(normal), index, np.arange(len(normal))[:, None])
+    for _ in range(SMOOTHING_PASSES):
+        near = normal[index]
+        alike = np.clip((near * normal[:, None]).sum(-1), 0, 1) ** ALIKE_POWER
+        mean = (near * alike[..., None]).sum(1)
+        size = np.linalg.norm(mean, axis=1, keepdims=True)
+        normal = np.where(size > 1e-6, mean / np.maximum(size, 1e-12), normal)
+    return normal

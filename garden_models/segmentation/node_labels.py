@@ -1,0 +1,190 @@
+"""Divide the nodes near a box between the background and the targets, in 3D."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.spatial import cKDTree
+
+from garden_models.segmentation.carrier import BoxEvidence, Carrier
+from garden_models.segmentation.colours import colour_bins, colour_counts, colour_posterior
+from garden_models.segmentation.node_graph import NodeGraph, lab_colours
+from garden_models.segmentation.random_walk import walk_on_graph
+
+Probabilities = Float[np.ndarray, "n labels"]
+
+# Strengths are relative to the edges' weights, which go up to 1.
+SURE = 10.0
+"""What cannot be otherwise."""
+SUPPORT = 1.0
+"""A node on or below the support."""
+VOTE = 0.5
+"""The votes of three or more views."""
+ISOLATED = 0.1
+"""A node of a connected core that nothing joins to what is outside of the box."""
+COLOUR = 0.05
+"""A node's colour, where the labels' colours differ fully."""
+INSIDE = 0.1
+"""All nodes inside a box and above its support, together, in units of a cut across them:
+a thing that goes on outside of the box through more than a tenth of its width is not the
+target, however much of it is inside.
+"""
+CENTRE = 0.6
+"""The same for the very middle of the box, as if all nodes were there."""
+LEAK = 0.3
+"""A core leaks when its joints to the outside reach this share of a cut across it."""
+NEAR = 0.1
+"""A part cut off from the core counts as near within this share of the core's size."""
+COLOUR_ROUNDS = 2
+EXCLUSIVE = 0.2
+"""What is left of a box's claim on nodes that a rival's box claims too."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One target's claim on the nodes: its box, how central (0..1) nodes are in it, what
+    carries it (None: nothing), and the connected nodes that fill its middle.
+    """
+
+    evidence: BoxEvidence
+    centrality: Float[np.ndarray, " n"]
+    carrier: Carrier | None
+    core: Bool[np.ndarray, " n"]
+
+
+@dataclass(frozen=True)
+class Votes:
+    """What the views say of each node: probability of the target, and weight (0..1)."""
+
+    target: Float[np.ndarray, " n"]
+    weight: Float[np.ndarray, " n"]
+
+
+def label_nodes(
+    graph: NodeGraph,
+    candidates: tuple[Candidate, ...],
+    votes: Votes | None = None,
+    before: Probabilities | None = None,
+) -> Probabilities:
+    """Return each node's probabilities: column 0 background, then one a candidate.
+
+    A node outside of a target's box, or on or below what carries it, is not its. The rest
+    is a random walk: from what is inside of each box, most of all in its middle, from what
+    is background, from the labels' colours, and from the ``votes`` of the views on the
+    first candidate; ``before`` is then the last round's result.
+    """
+    open_to, grip = _claims(graph, candidates)
+    drawn = np.zeros(open_to.shape)
+    contested = open_to[:, 1:].sum(1)
+    for k, candidate in enumerate(candidates, 1):
+        share = np.where(contested == 1, 1.0, EXCLUSIVE) * open_to[:, k]
+        near, draw = _draw(graph, candidate, share, grip)
+        drawn[:, k] += near * draw
+        drawn[:, 0] += (1 - near) * draw
+    drawn[:, 0] += SUPPORT * np.where(contested == 1, grip, 0.0)
+    if votes is not None and before is not None:
+        drawn += _vote(votes, before, open_to)
+    drawn[contested == 0] = 0.0
+    drawn[contested == 0, 0] = SURE
+
+    result, bins = before, colour_bins(lab_colours(graph.cloud.rgb))
+    for _ in range(COLOUR_ROUNDS + (before is None)):
+        total = drawn
+        if result is not None:
+            colour, sure = _colour_evidence(bins, result, graph.cloud.spacing**2)
+            total = drawn + np.where(contested[:, None] > 0, COLOUR * sure[:, None] * colour, 0.0)
+        strength = total.sum(1)
+        prior = total / np.maximum(strength, 1e-12)[:, None]
+        prior[strength <= 0, 0] = 1.0
+        result = walk_on_graph(graph.edges, graph.weights, prior, strength, result) * open_to
+        result /= np.maximum(result.sum(1, keepdims=True), 1e-9)
+    assert result is not None
+    return result
+
+
+def support_grip(graph: NodeGraph, carrier: Carrier) -> Float[np.ndarray, " n"]:
+    """Return how surely (0..1) each node belongs to the support or lies below it.
+
+    Within the band, a node that faces up is support, the surer the nearer to it; one that
+    faces sideways may be the foot of what stands there.
+    """
+    below = carrier.below / carrier.band
+    upward = np.clip(2 * np.abs(graph.cloud.normal[:, 1]) - 0.8, 0, 1)
+    near = np.clip(1.5 - np.abs(below), 0, 1) * upward
+    return np.where(below > 1.0, 1.0, np.where(below > -0.3, np.maximum(near, 0.5), near))
+
+
+def isolation(graph: NodeGraph, candidate: Candidate) -> float:
+    """Return 1 where no edges lead from the core out of the box, falling to 0 with them.
+
+    Edges to the support do not count: there the core ends by its height.
+    """
+    i, j = graph.edges.T
+    core, outside = candidate.core, ~candidate.evidence.inside
+    if candidate.carrier is not None:
+        outside = outside & (support_grip(graph, candidate.carrier) == 0)
+    joints = graph.weights[(core[i] & outside[j]) | (core[j] & outside[i])].sum()
+    across = 3 * np.sqrt(max(np.count_nonzero(core), 1))
+    return float(np.exp(-((joints / across / LEAK) ** 2)))
+
+
+def _claims(
+    graph: NodeGraph, candidates: tuple[Candidate, ...]
+) -> tuple[Bool[np.ndarray, "n labels"], Float[np.ndarray, " n"]]:
+    """Return which labels each node may have, and the supports' grip on it."""
+    open_to = np.ones((len(graph.cloud), len(candidates) + 1), bool)
+    on_support = np.zeros(len(graph.cloud))
+    for k, candidate in enumerate(candidates, 1):
+        open_to[:, k] = candidate.evidence.inside
+        if candidate.carrier is not None:
+            grip = support_grip(graph, candidate.carrier)
+            open_to[:, k] &= grip < 1.0
+            on_support = np.maximum(on_support, np.where(candidate.evidence.inside, grip, 0.0))
+    return open_to, on_support
+
+
+def _draw(
+    graph: NodeGraph,
+    candidate: Candidate,
+    share: Float[np.ndarray, " n"],
+    grip: Float[np.ndarray, " n"],
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return how near (0..1) nodes are to a candidate's core, and how strongly it draws them."""
+    near = np.ones(len(graph.cloud))
+    core = graph.cloud.xyz[candidate.core]
+    if len(core):
+        distance, _ = cKDTree(core).query(graph.cloud.xyz, workers=2)
+        size = float(np.linalg.norm(np.ptp(np.percentile(core, [2, 98], axis=0), axis=0)))
+        apart = 0.8 * np.exp(-((distance / max(NEAR * size, 1e-12)) ** 2))
+        near = np.where(candidate.core, 1.0, apart)
+    # Counted over a surface of n nodes, a cut across it meets about sqrt(n) of them.
+    weak = 1.0 / np.sqrt(max(np.count_nonzero(share), 1))
+    middle = near * candidate.centrality * candidate.evidence.seen
+    alone = candidate.core * isolation(graph, candidate) * (1 - grip)
+    return near, share * (weak * (INSIDE + CENTRE * middle) + ISOLATED * alone)
+
+
+def _vote(
+    votes: Votes, before: Probabilities, open_to: Bool[np.ndarray, "n labels"]
+) -> Float[np.ndarray, "n labels"]:
+    """Spread the votes over the labels: what is not the first candidate's is divided
+    between the other labels as before.
+    """
+    rest = before * open_to
+    rest[:, 0] += 1e-6
+    rest[:, 1] = 0.0
+    rest /= rest.sum(1, keepdims=True)
+    out = rest * (1 - votes.target)[:, None]
+    out[:, 1] = votes.target * open_to[:, 1]
+    return VOTE * votes.weight[:, None] * out
+
+
+def _colour_evidence(
+    bins: Int[np.ndarray, " n"], labels: Probabilities, area: Float[np.ndarray, " n"]
+) -> tuple[Probabilities, Float[np.ndarray, " n"]]:
+    """Return what the nodes' colours say of their labels, and how surely (0..1)."""
+    colour = colour_posterior(colour_counts(bins, labels * area[:, None]))[bins]
+    count = labels.shape[1]
+    return colour, ((count * colour.max(1) - 1) / (count - 1)).clip(0, 1)

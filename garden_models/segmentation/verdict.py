@@ -1,0 +1,97 @@
+"""Judge a segmentation by its own evidence."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from garden_models.scene import SupportSurface, Target, Verdict
+from garden_models.segmentation.box import ViewBox
+from garden_models.segmentation.occlusion import Outlined
+
+FEW_POINTS = 150
+"""Fewer points than this do not make a mesh."""
+FEW_VIEWS = 3
+EMPTY_BOX = 0.05
+"""A mask that fills less of its box than this is not what the box was drawn around."""
+CUT_BORDER = 0.1
+"""A mask that covers more of the box's border than this is cut off by it."""
+UNSURE = 0.25
+"""Share of the object's points with a probability near one half that makes it doubtful."""
+AGREEMENT = 0.6
+"""Mean overlap of masks and projected points under which the views disagree."""
+
+Masks = tuple[Bool[np.ndarray, "h w"], ...]
+
+
+def judge(
+    target: Target,
+    box: ViewBox,
+    masks: Masks,
+    points: int,
+    outlined: list[Outlined],
+    support: SupportSurface | None,
+    probability: Float[np.ndarray, " n"],
+) -> Verdict:
+    """Return ok, or degraded with every reason that holds.
+
+    ``points`` is how many points the object has, ``probability`` that of all nodes near it.
+    """
+    reasons = []
+    name = target.name
+    if support is None:
+        reasons.append(
+            f"Nothing carries {name!r}: no level surface touches it from below, so it may hang "
+            "or be mounted, and it will not stay where it is when simulated."
+        )
+    if points < FEW_POINTS:
+        reasons.append(
+            f"Only {points} reconstructed points belong to {name!r}; take more photos of it "
+            "from nearby viewpoints, or photos of higher resolution."
+        )
+    shown = sum(bool(mask.any()) for mask in masks)
+    if shown < FEW_VIEWS:
+        reasons.append(f"{name!r} is visible in {shown} of {len(masks)} photos only.")
+    mask = masks[box.view]
+    area = float(np.prod(box.size))
+    if mask.sum() < EMPTY_BOX * area:
+        reasons.append(
+            f"The object found in the box of {name!r} fills only {mask.sum() / area:.0%} of it."
+        )
+    cut = _border_share(mask, box)
+    if cut > CUT_BORDER:
+        reasons.append(
+            f"The box of {name!r} may cut the object off: {cut:.0%} of the box's border lies on "
+            "it; draw a box that holds all of it."
+        )
+    near = probability[probability > 0.3]
+    unsure = float(np.mean(near < 0.6)) if len(near) else 0.0
+    if unsure > UNSURE:
+        reasons.append(
+            f"Where {name!r} ends is uncertain for {unsure:.0%} of its points: it touches things "
+            "that look alike; boxes around those would tell them apart."
+        )
+    scores = [one.overlap for one in outlined if one.occluded <= 0.5 and np.isfinite(one.overlap)]
+    agreement = float(np.mean(scores)) if scores else 0.0
+    if agreement < AGREEMENT:
+        reasons.append(
+            f"The masks of {name!r} agree with its points by only {agreement:.0%} on average."
+        )
+    return Verdict("degraded" if reasons else "ok", tuple(reasons))
+
+
+def _border_share(mask: Bool[np.ndarray, "h w"], box: ViewBox) -> float:
+    """Return the share of the box's border (off the picture's own border) on the mask."""
+    height, width = mask.shape
+    x0, y0 = np.maximum(np.floor(box.low), 0).astype(int)
+    x1, y1 = np.minimum(np.ceil(box.high), [width, height]).astype(int) - 1
+    sides = []
+    if x0 > 1:
+        sides.append(mask[y0 : y1 + 1, x0])
+    if x1 < width - 2:
+        sides.append(mask[y0 : y1 + 1, x1])
+    if y0 > 1:
+        sides.append(mask[y0, x0 : x1 + 1])
+    if y1 < height - 2:
+        sides.append(mask[y1, x0 : x1 + 1])
+    return float(np.mean(np.concatenate(sides))) if sides else 0.0
