@@ -55,16 +55,20 @@ OK = Verdict()
 
 @dataclass(frozen=True)
 class KnownCamera:
-    """A camera given by the user for one photo, at the photo's stored (ingested) size."""
+    """A camera given by the user for one photo; ``K`` is for the photo's ingested size.
+
+    ``distortion`` (OpenCV k1, k2, p1, p2) is still in the photo.
+    """
 
     photo: str
     K: Float[np.ndarray, "3 3"]
     camera_from_world: Float[np.ndarray, "3 4"]
+    distortion: Float[np.ndarray, "4"] = field(default_factory=lambda: np.zeros(4))
 
 
 @dataclass(frozen=True)
 class Photo:
-    """One ingested photo: upright by its EXIF tag, undistorted if its camera is known.
+    """One ingested photo: upright by its EXIF tag.
 
     ``focal_px`` is the focal length in pixels of ``rgb`` if EXIF gives it.
     ``original_size`` is (width, height) of the file after EXIF orientation; boxes of
@@ -84,7 +88,6 @@ class Capture:
     SCHEMA: ClassVar[str] = "garden.Capture/1"
     photos: tuple[Photo, ...]
     cameras: tuple[KnownCamera, ...] = ()
-    cameras_metric: bool = False
     verdict: Verdict = OK
 
 
@@ -386,7 +389,8 @@ class Body:
     which is the upright object frame with the placement's scale baked in.
 
     ``inertia`` (kg m^2) is about the centre of mass. ``lifted_m`` is how far it was
-    raised because it started inside its support. ``physics_note`` says where mass and
+    raised because it started inside its support (negative: lowered onto it), ``pushed_m``
+    how far it was moved sideways out of another body. ``physics_note`` says where mass and
     friction come from.
     """
 
@@ -403,6 +407,7 @@ class Body:
     lifted_m: float
     supported_by: str
     physics_note: str = ""
+    pushed_m: float = 0.0
     verdict: Verdict = OK
 
 
