@@ -1,0 +1,1 @@
+"""Measure the pipeline against captures with truth; only benchmarks read truth."""

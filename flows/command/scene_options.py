@@ -1,0 +1,121 @@
+"""Read the options that say which scene is meant, for ``factorize`` and ``plan``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from pathlib import Path
+
+from flows.capture import FoundCapture, find_capture
+from flows.command import say
+from flows.preset import read_preset
+from flows.scene_run import SceneRequest
+from flows.wrong_use import WrongUse
+from garden_models.scene import Target
+from garden_models.targets.boxes import check_name, parse_boxes, parse_targets, validate
+from storage import Store
+
+SCENES = "scenes"
+
+
+def add_scene_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that name the capture, its targets, its cameras and the preset."""
+    parser.add_argument(
+        "capture",
+        metavar="CAPTURE",
+        help="folder of photos (or with images/ in it), video, transforms.json, COLMAP model",
+    )
+    parser.add_argument("--name", help="the scene's name (default: the capture's)")
+    parser.add_argument(
+        "--out", metavar="FOLDER", default=SCENES, help="where the package OUT/NAME goes (scenes)"
+    )
+    parser.add_argument(
+        "--box",
+        action="append",
+        nargs=6,
+        default=[],
+        metavar=("NAME", "PHOTO", "X0", "Y0", "X1", "Y1"),
+        help="an object to factor out: a box in pixels of one photo; may be repeated",
+    )
+    parser.add_argument("--targets", metavar="FILE", help="boxes from a file like targets.json")
+    parser.add_argument(
+        "--cameras", metavar="FILE", help="known cameras: transforms.json or a COLMAP model"
+    )
+    parser.add_argument("--preset", default="embedded", help="named preset or a TOML file")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="STEP.OPTION=VALUE",
+        dest="settings",
+        help="change one option of the preset, e.g. reconstruct.long_side=640",
+    )
+    parser.add_argument(
+        "--force", action="append", default=[], metavar="STEP", help="run a step even if cached"
+    )
+
+
+def scene_request(options: argparse.Namespace) -> SceneRequest:
+    """Check the options and return the scene they ask for, before any work starts."""
+    capture = find_capture(Path(options.capture), options.cameras and Path(options.cameras))
+    name = check_name(options.name or capture.name, "scene")
+    targets = _targets(options, capture)
+    if capture.sizes:
+        validate(targets, capture.sizes)
+    preset = read_preset(options.preset, options.settings)
+    return SceneRequest(
+        name=name,
+        source=capture.source,
+        targets=targets,
+        preset=preset,
+        package=Path(options.out) / name,
+        remarks=_remarks(capture, targets),
+        force=frozenset(options.force),
+    )
+
+
+def open_store(options: argparse.Namespace, create: bool = True) -> Store:
+    """Open the store that ``--store``, ``$GARDEN_STORE`` or the cache folder names."""
+    return Store.open(store_path(options.store), create=create)
+
+
+def store_path(given: str | None) -> Path:
+    """Return the store's folder."""
+    if given or os.environ.get("GARDEN_STORE"):
+        return Path(given or os.environ["GARDEN_STORE"])
+    cache = os.environ.get("XDG_CACHE_HOME")
+    return (Path(cache) if cache else Path.home() / ".cache") / "garden" / "store"
+
+
+def _targets(options: argparse.Namespace, capture: FoundCapture) -> tuple[Target, ...]:
+    if options.targets and options.box:
+        raise WrongUse("give the targets either with --targets or with --box, not both")
+    if options.box:
+        return parse_boxes(options.box)
+    path = Path(options.targets) if options.targets else capture.targets_file
+    if path is None:
+        return ()
+    try:
+        return parse_targets(json.loads(path.read_text("utf-8")))
+    except FileNotFoundError:
+        raise WrongUse(f"no such targets file: {path}") from None
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise WrongUse(f"{path} is not JSON ({error}): see README for its form") from None
+
+
+def _remarks(capture: FoundCapture, targets: tuple[Target, ...]) -> tuple[str, ...]:
+    remarks = []
+    if not targets:
+        remarks.append(
+            "no targets were given, so nothing was factored out (give some with --box NAME PHOTO "
+            "X0 Y0 X1 Y1 or a targets.json)"
+        )
+    if capture.unused_cameras:
+        remarks.append(
+            f"{capture.unused_cameras.name} lies beside the photos but was not used; give it with "
+            "--cameras to use it"
+        )
+    for remark in remarks:
+        say(f"note: {remark}")
+    return tuple(remarks)

@@ -1,0 +1,85 @@
+"""``garden why``: tell from which steps and inputs an artifact came."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from flows.command import EXIT_OK, print_json
+from flows.command.scene_options import open_store
+from flows.wrong_use import WrongUse
+from storage import ActionRecord, Store
+
+DESCRIPTION = """\
+Tell from which steps, inputs, options and code an artifact came. ARTIFACT is the start of
+a key or digest as `garden store ls` or report.json show it, or a step: `mesh_object`,
+`mesh_object[mug]` (the newest one)."""
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add this command's options."""
+    parser.description = DESCRIPTION
+    parser.add_argument("artifact", metavar="ARTIFACT|STEP")
+    parser.add_argument("--scene", help="only this scene")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; return the exit code."""
+    store = open_store(options, create=False)
+    found = [r for r in store.find(options.artifact) if options.scene in (None, r.scene)]
+    if not found:
+        raise WrongUse(
+            f"nothing in {store.path} is called {options.artifact}; see `garden store ls`"
+        )
+    chain = _chain(found[-1], store)
+    if options.json:
+        print_json({"artifact": options.artifact, "chain": chain})
+        return EXIT_OK
+    for entry in chain:
+        name = f"{entry['step']}[{entry['target']}]" if entry["target"] else entry["step"]
+        print(f"{'  ' * entry['depth']}{name}  {entry['status']}, {entry['seconds']:.2f} s")
+        for line in (f"key     {entry['key']}", f"config  {entry['config']}"):
+            print(f"{'  ' * entry['depth']}    {line}")
+        for reason in entry["reasons"]:
+            print(f"{'  ' * entry['depth']}    {reason}")
+    return EXIT_OK
+
+
+def _chain(record: ActionRecord, store: Store) -> list[dict[str, Any]]:
+    """Return the record and everything it was made from, nearest first, each once."""
+    makers = {
+        output.content: maker for maker in store.actions() for output in maker.outputs.values()
+    }
+    chain: list[dict[str, Any]] = []
+    seen: set[str] = set()
+
+    def follow(current: ActionRecord, depth: int) -> None:
+        if current.key in seen:
+            return
+        seen.add(current.key)
+        chain.append(_entry(current, depth))
+        for content in current.parts["inputs"].values():
+            if content in makers:
+                follow(makers[content], depth + 1)
+
+    follow(record, 0)
+    return chain
+
+
+def _entry(record: ActionRecord, depth: int) -> dict[str, Any]:
+    return {
+        "depth": depth,
+        "step": record.step,
+        "target": record.label or None,
+        "scene": record.scene,
+        "status": record.verdict["status"],
+        "reasons": list(record.verdict["reasons"]),
+        "seconds": sum(record.seconds.values()),
+        "key": record.key,
+        "content": {name: output.content for name, output in record.outputs.items()},
+        "inputs": record.parts["inputs"],
+        "config": record.parts["config"],
+        "packages": record.parts["packages"],
+        "backend": record.backend,
+        "ran_because": record.why.get("sentence", ""),
+    }

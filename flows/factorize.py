@@ -1,0 +1,127 @@
+"""Factorize one scene: the paper's figure 2, one line an arrow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+from tasks.ingest import CaptureSource, ingest
+
+from flows.preset import Preset
+from garden_models.scene import Target
+from tasks.align_gravity import align_gravity
+from tasks.clean_background import clean_background
+from tasks.compose import compose
+from tasks.label_points import label_points
+from tasks.mesh_object import mesh_object
+from tasks.place_object import place_object
+from tasks.reconstruct import reconstruct
+from tasks.register import register
+from tasks.render import render
+from tasks.segment import segment
+from tasks.simulate import simulate
+from tasks.step import Ref, StepFailed, fan_out
+
+
+@dataclass(frozen=True)
+class FactoredObject:
+    """References to what was made of one target."""
+
+    target: Target
+    masks: Ref
+    mesh: Ref
+    placement: Ref
+    labels: Ref
+
+
+@dataclass
+class SceneRefs:
+    """References to every artifact of a scene, as far as it came; filled as the flow runs."""
+
+    targets: tuple[Target, ...]
+    capture: Ref | None = None
+    cameras: Ref | None = None
+    reconstruction: Ref | None = None
+    gravity_view: Ref | None = None
+    objects: tuple[FactoredObject, ...] = ()
+    failed_targets: tuple[tuple[Target, StepFailed], ...] = ()
+    background: Ref | None = None
+    scene: Ref | None = None
+    trajectory: Ref | None = None
+    renders: Ref | None = None
+    failure: StepFailed | None = None
+
+
+def factorize_scene(
+    source: CaptureSource, targets: tuple[Target, ...], preset: Preset, refs: SceneRefs
+) -> SceneRefs:
+    """Turn a capture into a settled scene; return (and fill) the references.
+
+    A failed target leaves the others alone; a failed registration ends the scene.
+    Raises StepFailed.
+    """
+    refs.capture = ingest(source, preset.ingest)
+    refs.cameras = register(refs.capture, preset.register)
+    if refs.cameras.failed:
+        raise StepFailed("register", "", "; ".join(refs.cameras.reasons), kind="BadGeometry")
+    refs.reconstruction = reconstruct(refs.capture, refs.cameras, preset.reconstruct)
+    refs.gravity_view = align_gravity(refs.reconstruction, preset.gravity)
+    factor = partial(factor_object, refs=refs, preset=preset)
+    outcomes = list(zip(targets, fan_out(factor, targets), strict=True))
+    refs.objects = tuple(o for _, o in outcomes if isinstance(o, FactoredObject))
+    refs.failed_targets = tuple((t, o) for t, o in outcomes if isinstance(o, StepFailed))
+    masks = tuple(o.masks for o in refs.objects)
+    meshes = tuple(o.mesh for o in refs.objects)
+    placements = tuple(o.placement for o in refs.objects)
+    labels = tuple(o.labels for o in refs.objects)
+    refs.background = clean_background(
+        refs.reconstruction, refs.gravity_view, labels, masks, preset.background
+    )
+    refs.scene = compose(
+        refs.reconstruction,
+        refs.gravity_view,
+        masks,
+        meshes,
+        placements,
+        refs.background,
+        preset.physics,
+    )
+    refs.trajectory = simulate(refs.scene, preset.simulation)
+    refs.renders = render(
+        refs.reconstruction,
+        refs.gravity_view,
+        refs.background,
+        refs.scene,
+        refs.trajectory,
+        tuple(dict.fromkeys(t.photo for t in targets)),
+        preset.render,
+    )
+    return refs
+
+
+def factor_object(target: Target, refs: SceneRefs, preset: Preset) -> FactoredObject:
+    """Take one target out of the scene: mask, mesh, pose, and its points."""
+    scene = refs.reconstruction, refs.gravity_view
+    masks = segment(*scene, target, rivals_of(target, refs.targets), preset.segment)
+    mesh = mesh_object(*scene, masks, preset.mesh)
+    placement = place_object(*scene, masks, mesh, preset.place)
+    labels = label_points(*scene, masks, mesh, placement, preset.disentangle)
+    return FactoredObject(target, masks, mesh, placement, labels)
+
+
+def rivals_of(target: Target, targets: tuple[Target, ...]) -> tuple[Target, ...]:
+    """Return the other targets whose boxes could claim the same points.
+
+    Boxes in the same photo are rivals if they overlap; boxes in different photos cannot
+    be compared before there is geometry, so they all count.
+    """
+
+    def apart(other: Target) -> bool:
+        (ax0, ay0, ax1, ay1), (bx0, by0, bx1, by1) = target.box, other.box
+        return ax1 <= bx0 or bx1 <= ax0 or ay1 <= by0 or by1 <= ay0
+
+    return tuple(
+        other
+        for other in targets
+        if other.name != target.name and not (other.photo == target.photo and apart(other))
+    )

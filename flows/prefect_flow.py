@@ -1,0 +1,79 @@
+"""Wrap a scene's run as a Prefect flow (imported only when something has to run)."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+import uuid
+from collections.abc import Callable
+from typing import Any
+
+os.environ.setdefault("PREFECT_SERVER_ANALYTICS_ENABLED", "false")
+os.environ.setdefault("PREFECT_LOGGING_LEVEL", "ERROR")
+
+import httpx
+from prefect import Flow, flow
+from prefect.artifacts import create_progress_artifact, update_progress_artifact
+from prefect.task_runners import ThreadPoolTaskRunner
+
+from tasks.step import StepEvent, step_name
+
+MAX_TASKS = 8
+"""Task runs of one scene at once; heavy ones limit themselves to the cores."""
+
+PROGRESS_EVERY_S = 2.0
+"""Each update of Prefect's page is a request to its server."""
+
+
+def scene_flow(scene: str) -> Callable[[Callable[..., Any]], Flow[..., Any]]:
+    """Return the decorator that makes a function the flow run of ``scene``."""
+    return flow(
+        name="factorize-scene",
+        flow_run_name=scene.replace("{", "(").replace("}", ")"),
+        task_runner=ThreadPoolTaskRunner(max_workers=MAX_TASKS),
+        validate_parameters=False,
+        persist_result=False,
+    )
+
+
+class PrefectProgress:
+    """A sink of step events that shows them as progress in Prefect's page, and passes them on.
+
+    What the page shows is a courtesy: a server that does not answer stops no scene.
+    """
+
+    def __init__(self, events: Callable[[StepEvent], None]) -> None:
+        self._events = events
+        self._artifacts: dict[str, uuid.UUID] = {}
+        self._shown: dict[str, float] = {}
+        self._lock = threading.Lock()
+
+    def __call__(self, event: StepEvent) -> None:
+        """Take one event, from any thread."""
+        self._events(event)
+        if event.kind == "progress" and self._is_due(event):
+            self._show(event, event.share or 0.0)
+        elif event.kind == "finished" and step_name(event.step, event.label) in self._artifacts:
+            self._show(event, 1.0)
+
+    def _is_due(self, event: StepEvent) -> bool:
+        name, now = step_name(event.step, event.label), time.monotonic()
+        with self._lock:
+            if now - self._shown.get(name, -PROGRESS_EVERY_S) < PROGRESS_EVERY_S:
+                return False
+            self._shown[name] = now
+            return True
+
+    def _show(self, event: StepEvent, share: float) -> None:
+        name = step_name(event.step, event.label)
+        text = f"{event.scene}: {name} {event.doing}".strip()
+        try:
+            if name in self._artifacts:
+                update_progress_artifact(self._artifacts[name], 100 * share, text)
+            else:
+                shown = create_progress_artifact(100 * share, description=text)
+                if isinstance(shown, uuid.UUID):
+                    self._artifacts[name] = shown
+        except httpx.HTTPError:
+            self._artifacts.pop(name, None)

@@ -1,0 +1,117 @@
+"""Choose each step's options: a named preset, a TOML file, and single settings."""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+import typing
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tasks.ingest import Ingest
+
+from garden_models.scene import BadInput
+from tasks.align_gravity import AlignGravity
+from tasks.clean_background import CleanBackground
+from tasks.compose import Compose
+from tasks.label_points import LabelPoints
+from tasks.mesh_object import MeshObject
+from tasks.place_object import PlaceObject
+from tasks.reconstruct import DenseStereo
+from tasks.register import Registration
+from tasks.render import RenderViews
+from tasks.segment import Segment
+from tasks.simulate import Simulation
+
+
+@dataclass(frozen=True)
+class Preset:
+    """The options of every step; the defaults are the embedded backends (CPU, offline)."""
+
+    ingest: Ingest = field(default_factory=Ingest)
+    register: Registration = field(default_factory=Registration)
+    reconstruct: DenseStereo = field(default_factory=DenseStereo)
+    gravity: AlignGravity = field(default_factory=AlignGravity)
+    segment: Segment = field(default_factory=Segment)
+    mesh: MeshObject = field(default_factory=MeshObject)
+    place: PlaceObject = field(default_factory=PlaceObject)
+    disentangle: LabelPoints = field(default_factory=LabelPoints)
+    background: CleanBackground = field(default_factory=CleanBackground)
+    physics: Compose = field(default_factory=Compose)
+    simulation: Simulation = field(default_factory=Simulation)
+    render: RenderViews = field(default_factory=RenderViews)
+
+
+PRESETS = {"embedded": Preset()}
+
+
+def read_preset(name_or_file: str, settings: list[str]) -> Preset:
+    """Return a named preset or that of a TOML file, changed by ``STEP.OPTION=VALUE`` settings.
+
+    Raises BadInput for an unknown preset, step or option, or a value of the wrong type.
+    """
+    if name_or_file in PRESETS:
+        preset = PRESETS[name_or_file]
+    elif name_or_file.endswith(".toml"):
+        preset = _from_toml(Path(name_or_file))
+    else:
+        raise BadInput(
+            f"no preset called {name_or_file}: use one of {', '.join(PRESETS)} or a .toml file"
+        )
+    for setting in settings:
+        path, separator, value = setting.partition("=")
+        step, dot, option = path.partition(".")
+        if not (separator and dot):
+            raise BadInput(f"--set {setting}: write it as STEP.OPTION=VALUE")
+        preset = _changed(preset, step, {option: _parsed(value)})
+    return preset
+
+
+def _from_toml(path: Path) -> Preset:
+    try:
+        document = tomllib.loads(path.read_text("utf-8"))
+    except FileNotFoundError:
+        raise BadInput(f"no such preset file: {path}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise BadInput(f"{path} is not TOML: {error}") from None
+    preset = PRESETS[document.pop("preset", "embedded")]
+    for step, options in document.items():
+        preset = _changed(preset, step, options)
+    return preset
+
+
+def _changed(preset: Preset, step: str, options: dict[str, Any]) -> Preset:
+    steps = [f.name for f in dataclasses.fields(preset)]
+    if step not in steps:
+        raise BadInput(f"no step called {step} in a preset: there are {', '.join(steps)}")
+    config = getattr(preset, step)
+    types = typing.get_type_hints(type(config))
+    known = [f.name for f in dataclasses.fields(config)]
+    for option, value in options.items():
+        if option not in known:
+            raise BadInput(f"{step} has no option {option}: there are {', '.join(known)}")
+        typed = _typed(value, types[option], f"{step}.{option}")
+        config = dataclasses.replace(config, **{option: typed})
+    return dataclasses.replace(preset, **{step: config})
+
+
+def _parsed(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _typed(value: Any, wanted: Any, name: str) -> Any:
+    origin = typing.get_origin(wanted)
+    if origin is tuple and isinstance(value, list):
+        return tuple(value)
+    if wanted is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    simple = {int, float, bool, str}
+    if wanted in simple and type(value) is not wanted:
+        raise BadInput(f"{name} must be of type {wanted.__name__}, got {value!r}")
+    if origin is typing.Literal and value not in typing.get_args(wanted):
+        raise BadInput(f"{name} must be one of {typing.get_args(wanted)}, got {value!r}")
+    return value

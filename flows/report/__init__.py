@@ -1,0 +1,1 @@
+"""The scene's report: ``document`` is the JSON, ``page`` the HTML made from it."""

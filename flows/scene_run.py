@@ -1,0 +1,145 @@
+"""Run one scene: plan it from the store, execute what is missing, write its package."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from tasks.ingest import CaptureSource
+
+from flows.factorize import SceneRefs, factorize_scene
+from flows.preset import Preset
+from garden_models.scene import Target
+from storage import Store
+from storage.formats.package import check_writable, package_source
+from tasks.step import PlanEntry, RunContext, StepEvent, StepFailed, run_context
+
+
+@dataclass(frozen=True)
+class SceneRequest:
+    """What the user asked for: one scene."""
+
+    name: str
+    source: CaptureSource
+    targets: tuple[Target, ...]
+    preset: Preset
+    package: Path
+    remarks: tuple[str, ...] = ()
+    force: frozenset[str] = frozenset()
+
+
+@dataclass
+class SceneResult:
+    """What came of it: the artifacts, every step's outcome, and the seconds it took."""
+
+    request: SceneRequest
+    refs: SceneRefs
+    outcomes: list[StepEvent] = field(default_factory=list)
+    seconds: float = 0.0
+
+    @property
+    def executed(self) -> int:
+        """Return how many steps were executed (not served from the store)."""
+        return sum(event.outcome == "executed" for event in self.outcomes)
+
+
+def plan_scene(request: SceneRequest, store: Store) -> tuple[SceneResult, list[PlanEntry]]:
+    """Tell what would run and why, from the store alone; nothing is executed."""
+    context = RunContext(store=store, scene=request.name, engine="plan", force=request.force)
+    result = _run(request, context)
+    result.outcomes = [_as_event(entry, request.name) for entry in context.plan]
+    return result, context.plan
+
+
+def is_finished(plan: list[PlanEntry], result: SceneResult) -> bool:
+    """Tell whether every step is in the store and the package was made from just these."""
+    nothing_to_run = all(entry.action == "cached" for entry in plan)
+    return nothing_to_run and package_source(result.request.package) == package_key(result)
+
+
+def run_scene(
+    request: SceneRequest,
+    store: Store,
+    events: Callable[[StepEvent], None],
+    engine: Literal["prefect", "local"] = "prefect",
+) -> SceneResult:
+    """Execute the scene's flow with Prefect (or ``local``, in this process without it).
+
+    A scene that fails comes back with ``refs.failure`` set and all that was computed.
+    """
+    check_writable(request.package)
+    if engine == "local":
+        return _run(request, _context(request, store, "local", events))
+    from flows.prefect_flow import PrefectProgress, scene_flow
+
+    context = _context(request, store, "prefect", PrefectProgress(events))
+    result: SceneResult = scene_flow(request.name)(_run)(request, context)
+    return result
+
+
+def _context(
+    request: SceneRequest,
+    store: Store,
+    engine: Literal["prefect", "local"],
+    events: Callable[[StepEvent], None],
+) -> RunContext:
+    return RunContext(
+        store=store, scene=request.name, engine=engine, events=events, force=request.force
+    )
+
+
+def package_key(result: SceneResult) -> str:
+    """Identify what a package is made from: all artifacts' contents, targets and name."""
+    from flows.package import PACKAGE_VERSION
+    from storage.digest import digest_value
+
+    refs = result.refs
+    contents = [
+        ref.content if ref else None
+        for ref in (
+            refs.capture, refs.cameras, refs.reconstruction, refs.gravity_view, refs.background,
+            refs.scene, refs.trajectory, refs.renders,
+        )
+    ]  # fmt: skip
+    objects = [
+        [o.target.name, o.masks.content, o.mesh.content, o.placement.content, o.labels.content]
+        for o in refs.objects
+    ]
+    failed = [[target.name, failure.reason] for target, failure in refs.failed_targets]
+    return digest_value(
+        (PACKAGE_VERSION, result.request.name, contents, objects, failed, result.request.remarks),
+        domain="garden.package/1",
+    )
+
+
+def _as_event(entry: PlanEntry, scene: str) -> StepEvent:
+    ref = entry.ref
+    return StepEvent(
+        "finished",
+        entry.step,
+        entry.label,
+        scene,
+        time.time(),
+        outcome="cached" if entry.action == "cached" else None,
+        backend=ref.backend,
+        seconds=ref.seconds,
+        peak_mb=ref.peak_mb,
+        status=ref.status,
+        reasons=ref.reasons,
+        why=entry.why,
+        ref=ref,
+    )
+
+
+def _run(request: SceneRequest, context: RunContext) -> SceneResult:
+    started = time.monotonic()
+    refs = SceneRefs(request.targets)
+    with run_context(context):
+        try:
+            factorize_scene(request.source, request.targets, request.preset, refs)
+        except StepFailed as failure:
+            refs.failure = failure
+    return SceneResult(request, refs, list(context.outcomes), time.monotonic() - started)
