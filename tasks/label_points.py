@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from garden_models.disentanglement.label import LabelPoints
-
 from garden_models.progress import Progress, silent
 from garden_models.scene import (
     GravityView,

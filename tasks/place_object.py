@@ -6,7 +6,6 @@ Degraded when even the best hypothesis explains the photos poorly.
 from __future__ import annotations
 
 from garden_models.placement.config import PlaceObject
-
 from garden_models.progress import Progress, silent
 from garden_models.scene import GravityView, ObjectMasks, ObjectMesh, Placement, Reconstruction
 from tasks.step import step

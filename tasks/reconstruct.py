@@ -6,9 +6,8 @@ the number of photos: it runs in a child process with a cap.
 
 from __future__ import annotations
 
-from garden_models.reconstruction.dense_stereo import DenseStereo
-
 from garden_models.progress import Progress, silent
+from garden_models.reconstruction.dense_stereo import DenseStereo
 from garden_models.scene import Capture, Reconstruction, SparseModel
 from tasks.step import step
 

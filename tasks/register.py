@@ -6,9 +6,8 @@ that it stays in the store. A foreign library that may hang: it runs in a child 
 
 from __future__ import annotations
 
-from garden_models.reconstruction.registration import Registration
-
 from garden_models.progress import Progress, silent
+from garden_models.reconstruction.registration import Registration
 from garden_models.scene import Capture, SparseModel
 from tasks.step import step, step_scratch
 

@@ -5,9 +5,8 @@ Only the report and evaluations need it.
 
 from __future__ import annotations
 
-from garden_models.rendering.views import RenderViews
-
 from garden_models.progress import Progress, silent
+from garden_models.rendering.views import RenderViews
 from garden_models.scene import (
     Background,
     GravityView,

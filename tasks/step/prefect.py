@@ -10,8 +10,8 @@ import functools
 from concurrent.futures import Future
 from typing import Any
 
-from tasks.step_execute import Call, execute
-from tasks.step_ref import Ref
+from tasks.step.execute import Call, execute
+from tasks.step.ref import Ref
 
 
 class Ticket:

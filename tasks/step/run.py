@@ -16,7 +16,7 @@ from types import FrameType
 from typing import Any, Literal, TypeVar
 
 from storage import Store
-from tasks.step_ref import PendingValue, PlanEntry, Ref, StepEvent
+from tasks.step.ref import PendingValue, PlanEntry, Ref, StepEvent
 
 Engine = Literal["prefect", "local", "plan"]
 T = TypeVar("T")
@@ -130,7 +130,7 @@ def load(ref: Ref | Future[Ref], expected: type[T], fields: tuple[str, ...] = ()
         PendingValue: a plan has no values of steps that would run first.
         CorruptArtifact: it was damaged, and what made it is not part of this run.
     """
-    from tasks.step_inputs import load_ref
+    from tasks.step.inputs import load_ref
 
     known = ref if isinstance(ref, Ref) else ref.result()
     if known.pending:

@@ -95,7 +95,7 @@ def _left_out(name: str) -> bool:
     package, _, rest = name.partition(".")
     inside = rest.partition(".")[0]
     if package == "tasks":
-        return inside == "step" or inside.startswith("step_")
+        return inside == "step"
     return package == "storage" and inside != "formats"
 
 

@@ -1,6 +1,6 @@
-"""Compute one isolated step: ``python -m tasks.step_child PIPE PARENT ORDER``.
+"""Compute one isolated step: ``python -m tasks.step.child PIPE PARENT ORDER``.
 
-``ORDER`` is a JSON file (``step_isolate``); answers are JSON lines on descriptor ``PIPE``.
+``ORDER`` is a JSON file (``tasks.step.isolate``); answers are JSON lines on descriptor ``PIPE``.
 What libraries print goes to the standard streams and never into the answers.
 """
 
@@ -62,14 +62,14 @@ def main() -> None:
 
 
 def obey(order: dict[str, Any], answers: Answers) -> dict[str, Any]:
-    """Compute and publish; return the parts of ``step_compute.Done`` as JSON."""
+    """Compute and publish; return the parts of ``Done`` as JSON."""
     sys.path[:] = order["path"]
     from storage import Store
     from tasks.step import Step
-    from tasks.step_compute import compute
-    from tasks.step_inputs import Arguments
-    from tasks.step_run import RunContext, run_context
-    from tasks.step_wire import plain_from_json, refs_from_json
+    from tasks.step.compute import compute
+    from tasks.step.inputs import Arguments
+    from tasks.step.run import RunContext, run_context
+    from tasks.step.wire import plain_from_json, refs_from_json
 
     step: Any = importlib.import_module(order["module"])
     for name in order["name"].split("."):

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
-from tasks.step_execute import Call, execute, plan
-from tasks.step_ref import Ref, StepFailed
-from tasks.step_run import RunContext, current_run
+from tasks.step.execute import Call, execute, plan
+from tasks.step.ref import Ref, StepFailed
+from tasks.step.run import RunContext, current_run
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -33,7 +33,7 @@ def launch_when_ready(
             if context.engine == "plan":
                 outcome.set_result(plan(call))
             elif context.engine == "prefect":
-                from tasks.step_prefect import submit_task
+                from tasks.step.prefect import submit_task
 
                 submit_task(call, outcome)
             else:

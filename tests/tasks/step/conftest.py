@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from storage import Store
-from tests.tasks import toy
+from tests.tasks.step import toy
 
 
 @pytest.fixture

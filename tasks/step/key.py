@@ -9,8 +9,8 @@ from typing import Any
 
 from storage.canonical import UNKEYED, is_array, plain_scalar
 from storage.digest import digest_value
-from tasks.step_code import Code
-from tasks.step_ref import Why
+from tasks.step.code import Code
+from tasks.step.ref import Why
 
 _SHOWN = 60  # characters of a value in a sentence
 

@@ -23,12 +23,12 @@ from typing import TYPE_CHECKING, Any
 
 from garden_models import scene
 from storage import CorruptArtifact, Published, errors
-from tasks.step_compute import Done
-from tasks.step_inputs import Arguments
-from tasks.step_memory import Peak, session_rss
-from tasks.step_ref import Cancelled, MemoryLimit, Seconds, StepCrashed, TimeLimit
-from tasks.step_run import RunContext
-from tasks.step_wire import plain_to_json, refs_to_json
+from tasks.step.compute import Done
+from tasks.step.inputs import Arguments
+from tasks.step.memory import Peak, session_rss
+from tasks.step.ref import Cancelled, MemoryLimit, Seconds, StepCrashed, TimeLimit
+from tasks.step.run import RunContext
+from tasks.step.wire import plain_to_json, refs_to_json
 
 if TYPE_CHECKING:
     from tasks.step import Step
@@ -114,7 +114,7 @@ def _child(folder: Path, order: dict[str, Any]) -> Iterator[_Child]:
     reading, writing = os.pipe()
     output = folder / "output.txt"
     (folder / "order.json").write_text(json.dumps(order))
-    command = [sys.executable, "-m", "tasks.step_child"]
+    command = [sys.executable, "-m", "tasks.step.child"]
     command += [str(writing), str(os.getpid()), str(folder / "order.json")]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     try:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from storage import CorruptArtifact, MissingArtifact
-from tasks.step_ref import Ref, StepFailed
-from tasks.step_run import RunContext
+from tasks.step.ref import Ref, StepFailed
+from tasks.step.run import RunContext
 
 
 @dataclass(frozen=True)

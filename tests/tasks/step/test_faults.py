@@ -12,7 +12,7 @@ import pytest
 from storage import CorruptArtifact, Store
 from tasks.step import Ref, RunContext, StepFailed, load, run_context, step
 from tests.storage.faulty import FaultyOs, disk
-from tests.tasks.toy import Numbers, Scaling, chain, in_run, make, ran, scale
+from tests.tasks.step.toy import Numbers, Scaling, chain, in_run, make, ran, scale
 
 
 def test_hit_means_verified_damage_is_found_and_mended(store: Store) -> None:

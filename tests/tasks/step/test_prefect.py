@@ -10,7 +10,7 @@ import pytest
 from garden_models.scene import Target
 from storage import Store
 from tasks.step import Ref, RunContext, StepEvent, StepFailed, fan_out, run_context
-from tests.tasks.toy import Scaling, make, pick, ran, scale
+from tests.tasks.step.toy import Scaling, make, pick, ran, scale
 
 pytestmark = pytest.mark.slow
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 from garden_models.progress import Progress
 from garden_models.scene import Verdict
 from storage import Published
-from tasks.step_inputs import Arguments, load_inputs
-from tasks.step_memory import peak_memory
-from tasks.step_ref import Cancelled, Seconds
-from tasks.step_run import RunContext
-from tasks.step_seed import seed_everything
+from tasks.step.inputs import Arguments, load_inputs
+from tasks.step.memory import peak_memory
+from tasks.step.ref import Cancelled, Seconds
+from tasks.step.run import RunContext
+from tasks.step.seed import seed_everything
 
 if TYPE_CHECKING:
     from tasks.step import Step

@@ -1,16 +1,4 @@
-"""Turn a typed function from nouns to nouns into a cached, timed, explained step.
-
-    @step(version=1)
-    def align_gravity(reconstruction: Reconstruction, config: AlignGravity) -> GravityView:
-        ...
-
-    with run_context(RunContext(store=Store.open("store"), scene="kitchen")):
-        ref = align_gravity(reconstruction_ref, AlignGravity())
-
-Inside a run a step takes references (``Ref``) for nouns and gives a reference back; the
-shell looks the action up, loads, computes, publishes and records. ``align_gravity.fn`` is
-the pure function.
-"""
+"""Make a step of a function: its key, its references, its three engines."""
 
 from __future__ import annotations
 
@@ -23,23 +11,15 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from storage.digest import digest_file
-from tasks.step_code import Code, code_of
-from tasks.step_execute import Call, execute, plan
-from tasks.step_inputs import Arguments, bind, futures_in, label_of, resolve, split
-from tasks.step_key import KeyParts, without
-from tasks.step_ref import (
-    Cancelled,
-    PendingValue,
-    PlanEntry,
+from tasks.step.code import Code, code_of
+from tasks.step.execute import Call, execute, plan
+from tasks.step.inputs import Arguments, bind, futures_in, label_of, resolve, split
+from tasks.step.key import KeyParts, without
+from tasks.step.ref import (
     Ref,
-    Seconds,
-    StepEvent,
-    StepFailed,
-    Why,
-    step_name,
 )
-from tasks.step_run import RunContext, current_run, load, run_context, step_scratch
-from tasks.step_submit import fan_out, launch_when_ready
+from tasks.step.run import RunContext, current_run
+from tasks.step.submit import launch_when_ready
 
 T = TypeVar("T")
 Backend = str | Callable[..., str]
@@ -95,7 +75,7 @@ class Step:
         if context.engine == "plan":
             return plan(call)
         if context.engine == "prefect":
-            from tasks.step_prefect import run_task
+            from tasks.step.prefect import run_task
 
             return run_task(call)
         return execute(call)
@@ -214,25 +194,3 @@ def step(
         return Step(fn, spec)
 
     return decorate
-
-
-__all__ = [
-    "Cancelled",
-    "PendingValue",
-    "PlanEntry",
-    "Ref",
-    "RunContext",
-    "Seconds",
-    "Step",
-    "StepEvent",
-    "StepFailed",
-    "StepSpec",
-    "Why",
-    "current_run",
-    "fan_out",
-    "load",
-    "run_context",
-    "step",
-    "step_name",
-    "step_scratch",
-]

@@ -7,7 +7,7 @@ from typing import Any
 
 from storage.canonical import dtype_name, is_array, little_endian
 from storage.codec.tree import decode, encode
-from tasks.step_ref import Ref
+from tasks.step.ref import Ref
 
 Json = Any
 

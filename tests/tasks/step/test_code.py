@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 
 from storage import SourceFile
-from tasks.step_code import code_of, forget_code
-from tasks.step_inputs import Arguments
-from tasks.step_key import explain
-from tests.tasks.toy import Scaling, scale
+from tasks.step.code import code_of, forget_code
+from tasks.step.inputs import Arguments
+from tasks.step.key import explain
+from tests.tasks.step.toy import Scaling, scale
 
 FILES = {
     "steps.py": """
@@ -121,10 +121,10 @@ def test_extra_modules_and_package_versions_count(package: Path) -> None:
 
 def test_the_shell_and_the_store_do_not_count() -> None:
     code_of.cache_clear()
-    modules = code_of("tests.tasks.toy").modules
+    modules = code_of("tests.tasks.step.toy").modules
     assert "garden_models.scene" in modules
     assert not [name for name in modules if name.startswith(("tasks.step", "storage"))]
-    formats = code_of("tests.tasks.toy", (), ("storage.formats",)).modules
+    formats = code_of("tests.tasks.step.toy", (), ("storage.formats",)).modules
     assert "storage.formats" in formats
     assert "storage.store" not in formats
 
@@ -132,11 +132,11 @@ def test_the_shell_and_the_store_do_not_count() -> None:
 def test_all_first_party_code_is_digested_quickly() -> None:
     forget_code()
     started = time.process_time()
-    code = code_of("tests.tasks.toy", (), ("garden_models",))
+    code = code_of("tests.tasks.step.toy", (), ("garden_models",))
     assert (time.process_time() - started) / len(code.modules) < 0.02
     forget_code()
     started = time.process_time()
-    code_of("tests.tasks.toy", (), ("garden_models",))
+    code_of("tests.tasks.step.toy", (), ("garden_models",))
     assert time.process_time() - started < 0.1  # parsed already
 
 
@@ -180,7 +180,7 @@ def test_explained_code_changes_name_the_modules() -> None:
 
 
 def test_skipped_arguments_do_not_count() -> None:
-    from tasks.step_key import without
+    from tasks.step.key import without
 
     assert without({"a": 1, "workers": 2}, ("workers",)) == {"a": 1}
     kept = without({"config": Scaling(2.0, "x")}, ("config.note",))
@@ -198,7 +198,7 @@ def test_source_files_count_by_content_not_place(tmp_path: Path) -> None:
 
 
 def test_keys_do_not_depend_on_the_hash_seed() -> None:
-    code = "from tests.tasks.test_step_code import parts; print(parts().key)"
+    code = "from tests.tasks.step.test_code import parts; print(parts().key)"
     keys = {
         subprocess.run(
             [sys.executable, "-c", code],

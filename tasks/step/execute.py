@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 from garden_models.scene import BadGeometry, BadInput
 from storage import ActionRecord, Output, StoreError
-from tasks.step_compute import Done, compute
-from tasks.step_inputs import Arguments, each
-from tasks.step_key import KeyParts, explain
-from tasks.step_ref import (
+from tasks.step.compute import Done, compute
+from tasks.step.inputs import Arguments, each
+from tasks.step.key import KeyParts, explain
+from tasks.step.ref import (
     Cancelled,
     MemoryLimit,
     Outcome,
@@ -32,7 +32,7 @@ from tasks.step_ref import (
     Why,
     step_name,
 )
-from tasks.step_run import RunContext
+from tasks.step.run import RunContext
 
 if TYPE_CHECKING:
     from tasks.step import Step
@@ -209,7 +209,7 @@ def _compute(call: Call) -> Done:
         call.context.emit(_event(call, "progress", share=share, doing=doing))
 
     if call.step.spec.isolated and call.context.isolate:
-        from tasks.step_isolate import compute_isolated
+        from tasks.step.isolate import compute_isolated
 
         return compute_isolated(call.context, call.step, call.arguments, call.label, report)
     return compute(call.context, call.step, call.arguments, report)

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from storage import Store
-from tasks import step_execute
 from tasks.step import (
     PendingValue,
     Ref,
@@ -25,7 +24,19 @@ from tasks.step import (
     step,
     step_scratch,
 )
-from tests.tasks.toy import Numbers, Scaling, chain, gather, in_run, make, pick, ran, scale, target
+from tasks.step import execute as execution
+from tests.tasks.step.toy import (
+    Numbers,
+    Scaling,
+    chain,
+    gather,
+    in_run,
+    make,
+    pick,
+    ran,
+    scale,
+    target,
+)
 
 
 def test_a_second_run_executes_nothing(store: Store) -> None:
@@ -230,7 +241,7 @@ def shaky(count: int) -> Numbers:
 def test_only_faults_that_may_pass_are_tried_again(
     store: Store, monkeypatch: pytest.MonkeyPatch, error: Exception, attempts: int
 ) -> None:
-    monkeypatch.setattr(step_execute, "_BACK_OFF_S", 0.001)
+    monkeypatch.setattr(execution, "_BACK_OFF_S", 0.001)
     failures[:] = [error]
     if attempts == 1:
         with pytest.raises(StepFailed, match=type(error).__name__):

@@ -1,0 +1,63 @@
+"""``garden benchmark``: measure the pipeline against captures with truth."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from pathlib import Path
+
+from flows.command import EXIT_FAILED, EXIT_OK, print_json, say
+from flows.command.scene_options import open_store
+from storage import Store
+
+DESCRIPTION = """\
+  garden benchmark sample [FOLDER]       the sample capture against its exact truth, end to end
+  garden benchmark depth CAPTURE ...     depth with estimated cameras, after one scale a scene
+  garden benchmark gravity CAPTURE ...   gravity with cameras given and with cameras estimated
+
+depth and gravity need captures with cameras.json (and depth/) as truth. Results come from
+the store where they are there. Exit code 1 if a measure of `sample` misses its limit."""
+
+SAMPLE = Path("tests/scenes/corner")
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add this command's options."""
+    parser.description = DESCRIPTION
+    parser.add_argument("name", choices=("sample", "depth", "gravity"))
+    parser.add_argument("captures", nargs="*", type=Path, metavar="CAPTURE")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; return the exit code."""
+    store = open_store(options)
+    if options.name == "sample":
+        return _sample(options, store)
+    from flows.benchmark.captures import depth_row, gravity_row, table
+
+    measure = depth_row if options.name == "depth" else gravity_row
+    rows = []
+    for capture in options.captures:
+        say(f"measuring {capture.name}")
+        rows.append(measure(capture, store))
+    if options.json:
+        print_json({"benchmark": options.name, "rows": rows})
+    else:
+        print(table(rows))
+    return EXIT_OK
+
+
+def _sample(options: argparse.Namespace, store: Store) -> int:
+    from flows.benchmark.captures import reconstructed_scene
+    from flows.benchmark.corner_truth import load_corner
+    from flows.benchmark.sample import measure_sample
+
+    folder = options.captures[0] if options.captures else SAMPLE
+    values = reconstructed_scene(folder, store)
+    measures = measure_sample(values, load_corner(folder))
+    if options.json:
+        print_json([{**dataclasses.asdict(m), "holds": m.holds} for m in measures])
+    else:
+        for measure in measures:
+            print(measure.line())
+    return EXIT_OK if all(m.holds for m in measures) else EXIT_FAILED
