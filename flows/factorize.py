@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 
-from tasks.ingest import CaptureSource, ingest
-
 from flows.preset import Preset
 from garden_models.scene import Target
 from tasks.align_gravity import align_gravity
 from tasks.clean_background import clean_background
 from tasks.compose import compose
+from tasks.ingest import CaptureSource, ingest
 from tasks.label_points import label_points
 from tasks.mesh_object import mesh_object
 from tasks.place_object import place_object

@@ -8,13 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from tasks.ingest import CaptureSource
-
 from flows.factorize import SceneRefs, factorize_scene
 from flows.preset import Preset
 from garden_models.scene import Target
 from storage import Store
 from storage.formats.package import check_writable, package_source
+from tasks.ingest import CaptureSource
 from tasks.step import PlanEntry, RunContext, StepEvent, StepFailed, run_context
 
 

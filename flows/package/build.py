@@ -7,9 +7,6 @@ import json
 from typing import Any
 
 import numpy as np
-from garden_models.physics.export_mjcf import mjcf_zup
-from storage.formats.colmap import colmap_model
-from storage.formats.nerfstudio import transforms_json
 
 from flows.package.frames import GLTF_FROM_GV, ZUP_FROM_GV, frames_document
 from flows.package.licences import licences_document
@@ -17,9 +14,12 @@ from flows.report.document import Json, report_document
 from flows.report.page import report_page
 from flows.report.values import SceneValues
 from garden_models.geometry.rigid import transform_points
+from garden_models.physics.export_mjcf import mjcf_zup
 from garden_models.reconstruction.surfels import surfels
 from garden_models.scene import Background, SimScene
+from storage.formats.colmap import colmap_model
 from storage.formats.glb import GlbNode, scene_glb
+from storage.formats.nerfstudio import transforms_json
 from storage.formats.ply import gaussians_ply, points_ply
 from storage.formats.png import depth_png, mask_png
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from html import escape
 
 import numpy as np
-from garden_models.rendering.turntable import Turntable, turn_mesh
 
 from flows.report.charts import Line, line_chart
 from flows.report.pictures import data_uri, mask_overlay
 from flows.report.values import ObjectValues, SceneValues
 from garden_models.geometry.rotation import matrix_from_quaternion
+from garden_models.rendering.turntable import Turntable, turn_mesh
 from garden_models.scene import Trajectory, Verdict
 
 MASKS_SHOWN = 12

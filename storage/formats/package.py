@@ -120,6 +120,6 @@ def _explained(error: OSError, folder: Path) -> PackageError:
             f"no space left for the package {folder}: free some space and run the same command "
             "again; what was computed is in the store"
         )
-    if error.errno in (errno.EROFS, errno.EACCES, errno.EPERM):
+    if error.errno in (errno.EROFS, errno.EACCES, errno.EPERM, errno.EEXIST, errno.ENOTDIR):
         return PackageError(f"{folder.parent} cannot be written to: give another folder with --out")
     return PackageError(f"the package {folder} could not be written: {error}")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
-import os
 import struct
+import tempfile
 import zlib
 from pathlib import Path
 
@@ -135,14 +136,25 @@ def test_an_output_folder_that_cannot_be_written(
     assert "--out" in said
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write to read-only folders")
 def test_a_read_only_output_folder(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, capture: Path
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    capture: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    (tmp_path / "scenes").mkdir(mode=0o555)
+    """Root may write to folders of mode 0555, so the file system itself refuses here."""
+    making = tempfile.mkdtemp
+
+    def refuse(*arguments: object, **named: object) -> str:
+        if named.get("dir") == tmp_path / "scenes":
+            raise OSError(errno.EROFS, "Read-only file system")
+        return making(*arguments, **named)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(tempfile, "mkdtemp", refuse)
     code, said = answer(capsys, tmp_path, capture)
     assert code == 1
     assert "cannot be written to" in said
+    assert "--out" in said
 
 
 def test_an_unknown_option_of_a_step_names_the_known_ones(
