@@ -1,10 +1,8 @@
-"""Read the sample capture's truth into typed arrays. For tests and benchmarks only.
+"""Read the sample capture's exact truth into typed arrays.
 
-Everything is in the metric world of ``truth/cameras.json``. Run like this::
+Everything is in the metric world of ``truth/cameras.json``::
 
-    from tests.scenes.corner_truth import load_corner
-
-    corner = load_corner()
+    corner = load_corner(Path("tests/scenes/corner"))
     duck = corner.object("duck")
     mask = corner.mask("duck", duck.target_photo)
 """
@@ -20,8 +18,6 @@ from typing import Any
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
-
-CORNER = Path("tests/scenes/corner")
 
 
 @dataclass(frozen=True)
@@ -158,7 +154,7 @@ class CornerTruth:
         return found
 
 
-def load_corner(folder: Path = CORNER) -> CornerTruth:
+def load_corner(folder: Path) -> CornerTruth:
     """Read the capture in ``folder`` with all of its truth; photos are read on demand."""
     truth = folder / "truth"
     cameras = _read_json(truth / "cameras.json")
