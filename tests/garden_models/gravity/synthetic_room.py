@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import cv2
@@ -27,6 +27,7 @@ class Room:
     walls: int = 2
     boxes: int = 3
     slanted: int = 0
+    corridor: bool = False
     ceiling: bool = False
     photos: int = 10
     pitch_deg: float = 25.0
@@ -67,6 +68,12 @@ def rectangles(room: Room, rng: np.random.Generator) -> list[np.ndarray]:
 
 def straight_rectangles(room: Room, rng: np.random.Generator) -> list[np.ndarray]:
     parts: list[np.ndarray] = []
+    if room.corridor:
+        for side in (-1.0, 1.0):
+            parts.append(rectangle((-1, side, 0), (9, 0, 0), (0, 0, 2.4)))
+            parts += [
+                rectangle((x, 0.99 * side, 0), (0.9, 0, 0), (0, 0, 2.0)) for x in (0.5, 2, 4, 6)
+            ]
     if room.floor:
         parts.append(rectangle((-2.5, -2.5, 0), (5, 0, 0), (0, 5, 0)))
     if room.ceiling:
@@ -100,13 +107,17 @@ def straight_rectangles(room: Room, rng: np.random.Generator) -> list[np.ndarray
 
 
 def cameras(room: Room, rng: np.random.Generator) -> list[np.ndarray]:
-    """Return ``camera_from_room`` of photos on an arc that look at the middle of the room."""
+    """Return ``camera_from_room`` of photos on an arc that look at the middle of the room,
+    or that walk along the corridor.
+    """
     out = []
     start = -np.pi / 4 - np.radians(room.orbit_deg) / 2
     for i in range(room.photos):
         azimuth = start + np.radians(room.orbit_deg) * i / max(1, room.photos - 1)
         pitch = np.radians(room.pitch_deg + rng.normal(0, 4))
         radius = rng.uniform(1.5, 1.9)
+        if room.corridor:
+            azimuth = np.pi + rng.normal(0, 0.02)
         away = np.array([np.cos(azimuth), np.sin(azimuth), 0])
         forward = -away * np.cos(pitch) - np.array([0, 0, np.sin(pitch)])
         x = np.cross(forward, [0, 0, 1.0])
@@ -116,6 +127,8 @@ def cameras(room: Room, rng: np.random.Generator) -> list[np.ndarray]:
         roll = np.radians(room.roll_deg + turn + rng.normal(0, room.roll_spread_deg))
         rotation = axis_angle(np.array([0, 0, 1.0]), roll) @ level
         centre = np.array([0, 0, 0.85]) - forward * radius
+        if room.corridor:
+            centre = np.array([0.15 * i - 0.9, rng.normal(0, 0.05), 1.5])
         out.append(rigid(rotation, -rotation @ centre))
     return out
 
@@ -150,12 +163,10 @@ def photograph(parts: list[np.ndarray], greys: np.ndarray, camera: np.ndarray, r
     return np.repeat(np.clip(noisy, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
 
 
-@cache
-def make_room(room: Room) -> tuple[Reconstruction, np.ndarray]:
-    """Return a reconstruction of the room in a turned world, and the true down there."""
-    rng = np.random.default_rng(room.seed)
-    parts = rectangles(room, rng)
-    views_room = cameras(room, rng)
+def fused_points(
+    parts: list[np.ndarray], views_room: list[np.ndarray], room: Room, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return noisy points on what two photos or more see, and normals that face them."""
     area = np.array([np.linalg.norm(np.cross(p[1] - p[0], p[3] - p[0])) for p in parts])
     which = rng.choice(len(parts), size=4 * room.points, p=area / area.sum())
     corners = np.array(parts)[which]
@@ -164,15 +175,15 @@ def make_room(room: Room) -> tuple[Reconstruction, np.ndarray]:
     points = corners[:, 0] + s * along + t * across
     normals = np.cross(along, across)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    centres = np.array([camera_centre(c) for c in views_room])
     seen = np.zeros(len(points), dtype=int)
     facing = np.zeros(len(points))
     nearest = np.full(len(points), np.inf)
-    for camera, centre in zip(views_room, centres, strict=True):
+    for camera in views_room:
         pixels, z = project(points, K, camera)
         inside = inside_image(pixels, SIZE) & (z > 0.2)
         seen += inside
-        facing += inside * np.sign(np.einsum("ni,ni->n", normals, centre - points))
+        towards = camera_centre(camera) - points
+        facing += inside * np.sign(np.einsum("ni,ni->n", normals, towards))
         nearest = np.where(inside, np.minimum(nearest, z), nearest)
     keep = np.flatnonzero((seen >= 2) & (facing != 0))[: room.points]
     points, normals, nearest = points[keep], normals[keep], nearest[keep]
@@ -182,38 +193,54 @@ def make_room(room: Room) -> tuple[Reconstruction, np.ndarray]:
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     wild = rng.uniform(size=len(points)) < room.outliers
     points[wild] += rng.normal(0, 0.3, (wild.sum(), 3))
+    return points, normals
 
-    world_from_room = rigid(matrix_from_quaternion(rng.normal(size=4)), rng.normal(size=3))
-    room_from_world = invert_rigid(world_from_room)
+
+def views_in_world(
+    views_room: list[np.ndarray], pictures: list[np.ndarray], room_from_world: np.ndarray
+) -> tuple[View, ...]:
+    """Return views without depth in the turned world."""
+    empty = np.zeros((SIZE[1], SIZE[0]))
+    return tuple(
+        View(f"{i:03d}.jpg", picture, empty, empty, K, (camera @ room_from_world)[:3], SIZE)
+        for i, (camera, picture) in enumerate(zip(views_room, pictures, strict=True))
+    )
+
+
+def turned_world(rng: np.random.Generator) -> np.ndarray:
+    """Return a random ``world_from_room``."""
+    return rigid(matrix_from_quaternion(rng.normal(size=4)), rng.normal(size=3))
+
+
+def reconstruct(views: tuple[View, ...], xyz: np.ndarray, normal: np.ndarray) -> Reconstruction:
+    count = len(xyz)
+    grey = np.full((count, 3), 128, np.uint8)
+    cloud = PointCloud(xyz, grey, normal, np.full(count, 0.02), np.ones(count))
+    return Reconstruction(views, cloud, xyz[:100], (), Scale("unknown"))
+
+
+@cache
+def make_room(room: Room) -> tuple[Reconstruction, np.ndarray]:
+    """Return a reconstruction of the room in a turned world, and the true down there."""
+    rng = np.random.default_rng(room.seed)
+    parts = rectangles(room, rng)
+    views_room = cameras(room, rng)
+    points, normals = fused_points(parts, views_room, room, rng)
+    world_from_room = turned_world(rng)
     greys = rng.permutation(np.linspace(60, 240, len(parts)))
-    views = tuple(
-        View(
-            f"{i:03d}.jpg",
-            photograph(parts, greys, camera, rng),
-            np.zeros((SIZE[1], SIZE[0])),
-            np.zeros((SIZE[1], SIZE[0])),
-            K,
-            (camera @ room_from_world)[:3],
-            SIZE,
-        )
-        for i, camera in enumerate(views_room)
-    )
-    count = len(points)
-    cloud = PointCloud(
-        transform_points(world_from_room, points),
-        np.full((count, 3), 128, np.uint8),
-        normals @ world_from_room[:3, :3].T,
-        np.full(count, 0.02),
-        np.ones(count),
-    )
-    reconstruction = Reconstruction(views, cloud, cloud.xyz[:100], (), Scale("unknown"))
+    pictures = [photograph(parts, greys, camera, rng) for camera in views_room]
+    views = views_in_world(views_room, pictures, invert_rigid(world_from_room))
+    xyz = transform_points(world_from_room, points)
+    reconstruction = reconstruct(views, xyz, normals @ world_from_room[:3, :3].T)
     return reconstruction, -world_from_room[:3, 2]
 
 
 def cameras_only(room: Room) -> tuple[Reconstruction, np.ndarray]:
-    """Return the room's cameras with blank photos and no points, and the true down."""
-    reconstruction, down = make_room(replace(room, points=1))
-    nothing = reconstruction.points_world.subset(np.zeros(0, dtype=int))
-    blank = np.full((SIZE[1], SIZE[0], 3), 90, np.uint8)
-    views = tuple(replace(view, rgb=blank) for view in reconstruction.views)
-    return replace(reconstruction, views=views, points_world=nothing), down
+    """Return cameras of the room with blank photos and no points, and the true down."""
+    rng = np.random.default_rng(room.seed)
+    views_room = cameras(room, rng)
+    world_from_room = turned_world(rng)
+    blank = [np.full((SIZE[1], SIZE[0], 3), 90, np.uint8)] * len(views_room)
+    views = views_in_world(views_room, blank, invert_rigid(world_from_room))
+    nothing = np.zeros((0, 3))
+    return reconstruct(views, nothing, nothing), -world_from_room[:3, 2]

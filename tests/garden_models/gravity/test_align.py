@@ -13,6 +13,9 @@ from garden_models.gravity.align import AlignGravity, align_gravity
 from garden_models.scene import BadGeometry, BadInput
 from tests.garden_models.gravity.synthetic_room import Room, cameras_only, make_room
 
+CORRIDOR = Room(
+    corridor=True, floor=False, table=False, boxes=0, walls=0, pitch_deg=12, roll_spread_deg=1
+)
 ROOMS = {
     "plain": Room(),
     "slanted clutter": Room(slanted=5),
@@ -25,6 +28,7 @@ ROOMS = {
     "all look one way": Room(orbit_deg=15),
     "straight down": Room(pitch_deg=70, walls=0),
     "one wall only": Room(floor=False, table=False, boxes=0, walls=1, pitch_deg=0, orbit_deg=60),
+    "corridor, walls alone": CORRIDOR,
     "floor and ceiling": Room(ceiling=True, pitch_deg=0),
 }
 
@@ -61,7 +65,7 @@ def test_cameras_alone_are_degraded_with_the_reason() -> None:
 
 def test_loose_clutter_is_never_surer_than_it_is() -> None:
     room = Room(floor=False, table=False, walls=0, boxes=0, slanted=9)
-    for seed in range(4):
+    for seed in range(2):
         reconstruction, down = make_room(replace(room, seed=seed))
         view = align_gravity(reconstruction)
         assert angle_between_deg(view.down_world, down) < 2.5 * view.sigma_deg
@@ -70,7 +74,7 @@ def test_loose_clutter_is_never_surer_than_it_is() -> None:
 @pytest.mark.slow
 def test_sigma_is_calibrated_on_crooked_rooms() -> None:
     ratios = []
-    for seed in range(24):
+    for seed in range(12):
         room = Room(
             seed=seed, crooked_deg=0.9, roll_deg=2 * np.sin(seed), slanted=seed % 4, walls=seed % 3
         )

@@ -51,10 +51,16 @@ def test_uncertainty_grows_when_all_photos_look_one_way() -> None:
 
 
 def test_careless_photos_are_less_sure() -> None:
-    steady, _ = cameras_only(Room(roll_spread_deg=1))
-    careless, _ = cameras_only(Room(roll_spread_deg=15))
-    sigmas = [camera_x_axes.estimate(r).sigma_deg for r in (steady, careless)]
-    assert sigmas[1] > 1.3 * sigmas[0]
+    sigmas = np.array(
+        [
+            [
+                camera_x_axes.estimate(cameras_only(room)[0]).sigma_deg
+                for room in (Room(seed=seed), Room(seed=seed, roll_spread_deg=10))
+            ]
+            for seed in range(8)
+        ]
+    )
+    assert sigmas[:, 1].mean() > 1.3 * sigmas[:, 0].mean()
 
 
 def test_sigma_is_calibrated_over_captures() -> None:
