@@ -9,12 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tasks.ingest import Ingest
-
 from garden_models.scene import BadInput
 from tasks.align_gravity import AlignGravity
 from tasks.clean_background import CleanBackground
 from tasks.compose import Compose
+from tasks.ingest import Ingest
 from tasks.label_points import LabelPoints
 from tasks.mesh_object import MeshObject
 from tasks.place_object import PlaceObject

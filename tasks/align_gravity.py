@@ -5,7 +5,7 @@ Degraded when the cues disagree or only a weak one stands.
 
 from __future__ import annotations
 
-from garden_models.gravity.align import AlignGravity
+from garden_models.gravity.config import AlignGravity
 from garden_models.progress import Progress, silent
 from garden_models.scene import GravityView, Reconstruction
 from tasks.step import step

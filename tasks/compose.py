@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from garden_models.physics.compose import Compose
+from garden_models.physics.config import Compose
 from garden_models.progress import Progress, silent
 from garden_models.scene import (
     Background,

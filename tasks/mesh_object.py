@@ -11,7 +11,18 @@ from garden_models.scene import GravityView, ObjectMasks, ObjectMesh, Reconstruc
 from tasks.step import step
 
 
-@step(version=1, packages=("numpy", "scipy", "scikit-image", "trimesh", "fast-simplification"))
+@step(
+    version=1,
+    packages=(
+        "numpy",
+        "scipy",
+        "scikit-image",
+        "torch",
+        "opencv-python-headless",
+        "embreex",
+        "fast-simplification",
+    ),
+)
 def mesh_object(
     reconstruction: Reconstruction,
     gravity_view: GravityView,

@@ -11,7 +11,7 @@ from garden_models.scene import GravityView, ObjectMasks, ObjectMesh, Placement,
 from tasks.step import step
 
 
-@step(version=1, packages=("numpy", "scipy"))
+@step(version=1, packages=("numpy", "scipy", "torch", "opencv-python-headless", "embreex"))
 def place_object(
     reconstruction: Reconstruction,
     gravity_view: GravityView,

@@ -6,7 +6,7 @@ Only the report and evaluations need it.
 from __future__ import annotations
 
 from garden_models.progress import Progress, silent
-from garden_models.rendering.views import RenderViews
+from garden_models.rendering.config import RenderViews
 from garden_models.scene import (
     Background,
     GravityView,

@@ -5,7 +5,7 @@ Degraded when something tilts, drifts or falls; failed when the simulation break
 
 from __future__ import annotations
 
-from garden_models.physics.simulate import Simulation
+from garden_models.physics.config import Simulation
 from garden_models.progress import Progress, silent
 from garden_models.scene import SimScene, Trajectory
 from tasks.step import step

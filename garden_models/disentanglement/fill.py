@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -11,13 +10,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from garden_models.disentanglement.config import CleanBackground
 from garden_models.disentanglement.label import cloud_in_gv
 from garden_models.disentanglement.photo_colours import PhotoView
-from garden_models.disentanglement.support_hole import FillHole, fill_hole
+from garden_models.disentanglement.support_hole import fill_hole
 from garden_models.geometry.rigid import homogeneous, invert_rigid
 from garden_models.progress import Progress, silent
 from garden_models.scene import (
-    OK,
     Background,
     BadInput,
     GravityView,
@@ -28,20 +27,6 @@ from garden_models.scene import (
     SupportSurface,
     Verdict,
 )
-
-
-@dataclass(frozen=True)
-class CleanBackground:
-    """How leftovers are recognised, and how holes are filled."""
-
-    near: float = 0.15
-    """Leftovers lie within this share of the object's size around it."""
-    link_spacings: float = 2.5
-    """Points closer than this many spacings hang together."""
-    most_leftover: float = 0.1
-    """A cluster of more points than this share of the object's is a thing of its own."""
-    layer_spacings: float = 2.5
-    hole: FillHole = field(default_factory=FillHole)
 
 
 def clean_background(
@@ -68,21 +53,66 @@ def clean_background(
                 f"reconstruction has {len(points)}: label it again"
             )
     owner = _owners(labels, len(points))
-    for i, mask in enumerate(masks):
-        owner[_leftovers(points, owner, i, mask.support, config)] = i
+    for i, (label, mask) in enumerate(zip(labels, masks, strict=True)):
+        owner[_hanging(points, owner, i, config)] = i
+        owner[_rims(points, owner, i, label, mask.support, config)] = i
     removed = {label.name: int((owner == i).sum()) for i, label in enumerate(labels)}
     background = points.subset(owner < 0)
     filled = np.zeros(len(background), bool)
-    verdict = OK
+    remarks = _not_fillable(masks, removed)
     views = _photo_views(reconstruction, gravity_view, masks)
+    taken = [points.subset(owner == i) for i in range(len(masks))]
+    groups = _neighbours(taken, masks)
+    for done, group in enumerate(groups):
+        names = " and ".join(masks[i].target.name for i in group)
+        progress(done / len(groups), f"filling the hole of {names}")
+        support = masks[group[0]].support
+        assert support is not None
+        filling = fill_hole(background, [taken[i] for i in group], support, views, config.hole)
+        if filling is None:
+            remarks.append(f"too little of the support around {names} was seen to fill its hole")
+            continue
+        keep = ~filling.replaced
+        background = _joined(background.subset(keep), filling.points_gv)
+        filled = np.concatenate([filled[keep], np.ones(len(filling.points_gv), bool)])
+    return Background(background, filled, removed, Verdict("ok", tuple(remarks)))
+
+
+def _not_fillable(masks: Sequence[ObjectMasks], removed: dict[str, int]) -> list[str]:
+    """Say of which targets no hole is filled, and why."""
+    remarks = []
+    for mask in masks:
+        name = mask.target.name
+        if not removed[name]:
+            remarks.append(f"{name} took no points away, so it left no hole")
+        elif mask.support is None:
+            remarks.append(f"the support of {name} is unknown, so no hole was filled")
+    return remarks
+
+
+def _neighbours(taken: Sequence[PointCloud], masks: Sequence[ObjectMasks]) -> list[list[int]]:
+    """Group targets that stood beside each other on one surface: their holes are one."""
+    groups: list[list[int]] = []
     for i, mask in enumerate(masks):
-        progress(i / len(masks), f"filling the hole of {mask.target.name}")
-        remark, background, filled = _filled(
-            background, filled, points.subset(owner == i), mask, views, config
-        )
-        if remark:
-            verdict = verdict.worst(Verdict("ok", (remark,)))
-    return Background(background, filled, removed, verdict)
+        if mask.support is None or not len(taken[i]):
+            continue
+        near = [group for group in groups if any(_beside(taken, masks, i, j) for j in group)]
+        merged = [i, *(j for group in near for j in group)]
+        groups = [group for group in groups if group not in near] + [sorted(merged)]
+    return groups
+
+
+def _beside(taken: Sequence[PointCloud], masks: Sequence[ObjectMasks], i: int, j: int) -> bool:
+    """Tell whether two targets stand at one height, closer than half of their size."""
+    first, second = masks[i].support, masks[j].support
+    boxes = [np.percentile(taken[k].xyz, [1, 99], axis=0) for k in (i, j)]
+    size = max(float((high - low).max()) for low, high in boxes)
+    if first is None or second is None:
+        return False
+    if abs(first.height_gv - second.height_gv) > 0.05 * size:
+        return False
+    gap = np.maximum(boxes[0][0] - boxes[1][1], boxes[1][0] - boxes[0][1])[[0, 2]]
+    return bool(gap.max() < 0.5 * size)
 
 
 def _photo_views(
@@ -113,57 +143,74 @@ def _owners(labels: Sequence[PointLabels], count: int) -> np.ndarray:
     return owner
 
 
-def _filled(
-    background: PointCloud,
-    filled: Bool[np.ndarray, " n"],
-    removed: PointCloud,
-    mask: ObjectMasks,
-    views: tuple[PhotoView, ...],
+def _hanging(
+    points: PointCloud, owner: np.ndarray, index: int, config: CleanBackground
+) -> np.ndarray:
+    """Return the indices of clusters that hang in the air where a target was taken away.
+
+    Whatever is linked to the support or to things around reaches out of the target's box.
+    """
+    candidates, cluster, count = _clusters_near(points, owner, index, None, config)
+    small = count <= config.most_leftover * (owner == index).sum()
+    return candidates[small[cluster]]
+
+
+def _rims(
+    points: PointCloud,
+    owner: np.ndarray,
+    index: int,
+    label: PointLabels,
+    support: SupportSurface | None,
     config: CleanBackground,
-) -> tuple[str, PointCloud, Bool[np.ndarray, " m"]]:
-    """Fill one target's hole; return a remark if that was not possible."""
-    name = mask.target.name
-    if not len(removed):
-        return f"{name} took no points away, so it left no hole", background, filled
-    if mask.support is None:
-        return f"the support of {name} is unknown, so no hole was filled", background, filled
-    filling = fill_hole(background, removed, mask.support, views, config.hole)
-    if filling is None:
-        remark = f"too little of the support around {name} was seen to fill its hole"
-        return remark, background, filled
-    keep = ~filling.replaced
-    joined = _joined(background.subset(keep), filling.points_gv)
-    flags = np.concatenate([filled[keep], np.ones(len(filling.points_gv), bool)])
-    return "", joined, flags
+) -> np.ndarray:
+    """Return the indices of small clusters above the support that are no thing of their own:
+
+    they were nearly the target's, or they hang free of the support.
+    """
+    if support is None:
+        return np.zeros(0, np.int64)
+    candidates, cluster, count = _clusters_near(points, owner, index, support, config)
+    likely = np.bincount(cluster, label.probability[candidates], len(count))
+    height = (support.height_gv - points.xyz[candidates, 1]) / points.spacing[candidates]
+    lowest = np.full(len(count), np.inf)
+    np.minimum.at(lowest, cluster, height)
+    goes = likely >= config.least_likely * np.maximum(count, 1)
+    goes |= lowest > config.layer_spacings + config.link_spacings
+    taken = (owner == index).sum()
+    goes &= count <= config.most_rim * taken
+    goes |= count <= config.most_speck * taken
+    return candidates[goes[cluster]]
 
 
-def _leftovers(
+def _clusters_near(
     points: PointCloud,
     owner: np.ndarray,
     index: int,
     support: SupportSurface | None,
     config: CleanBackground,
-) -> np.ndarray:
-    """Return the indices of small clusters that float where a target was taken away."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return background points in clusters within the box of what a target took away.
+
+    The answer is their indices, each one's cluster, and the clusters' sizes. With a support,
+    only points above its layer are linked; clusters that reach out of the box are left out.
+    """
+    none = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
     taken = owner == index
     if not taken.any():
-        return np.zeros(0, int)
+        return none
     low, high = np.percentile(points.xyz[taken], [1, 99], axis=0)
     reach = config.near * float((high - low).max())
-    floating = owner < 0
+    asked = (owner < 0) & _in_box(points.xyz, low - 2 * reach, high + 2 * reach)
     if support is not None:
-        floating &= points.xyz[:, 1] < support.height_gv - config.layer_spacings * points.spacing
-    outer = floating & _in_box(points.xyz, low - 2 * reach, high + 2 * reach)
-    candidates = np.flatnonzero(outer)
+        asked &= points.xyz[:, 1] < support.height_gv - config.layer_spacings * points.spacing
+    candidates = np.flatnonzero(asked)
     if not len(candidates):
-        return candidates
+        return none
     cluster = _clusters(points.subset(candidates), config.link_spacings)
     inner = _in_box(points.xyz[candidates], low - reach, high + reach)
+    within = (np.bincount(cluster, ~inner) == 0)[cluster]
     count = np.bincount(cluster)
-    # A cluster that reaches out of the box is part of something else.
-    stays = np.bincount(cluster, ~inner) > 0
-    stays |= count > config.most_leftover * taken.sum()
-    return candidates[~stays[cluster]]
+    return candidates[within], cluster[within], count
 
 
 def _clusters(points: PointCloud, link_spacings: float) -> np.ndarray:

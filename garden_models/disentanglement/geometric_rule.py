@@ -16,51 +16,18 @@ have holes where a print or a shadow looks like something else.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from garden_models.disentanglement.config import GeometricRule
 from garden_models.disentanglement.mask_votes import Votes, mask_votes
 from garden_models.disentanglement.protocol import Crop, PlacedMesh
 from garden_models.disentanglement.signed_distance import signed_distance
 from garden_models.progress import Progress, silent
 from garden_models.scene import PointCloud, SupportSurface
-
-
-@dataclass(frozen=True)
-class GeometricRule:
-    """Weights are log-odds; lengths are relative to the point's spacing or the mesh's size."""
-
-    mesh_noise: float = 0.015
-    """1-sigma noise of mesh and placement, of the object's size."""
-    spacings: float = 2.0
-    depth_tolerance: float = 0.015
-    """Relative error of the depth maps within which a point is visible."""
-    distance_weight: float = 2.0
-    most_inside: float = 2.5
-    least_outside: float = -1.0
-    """Bounds of the distance's evidence in tolerances: however far, masks can outvote it."""
-    mask_weight: float = 3.5
-    enough_votes: float = 3.0
-    """Photos from which on the masks' share counts in full."""
-    ghost_weight: float = 3.0
-    ghost_reach: float = 0.1
-    """How far from the mesh, of its size, a floating point counts as the object's ghost, and a
-    surrounded cluster as its part."""
-    support_weight: float = 2.0
-    """Log-odds of being support on its layer: only masks of most photos outvote it (that
-    costs little where they are wrong: the support is filled again)."""
-
-    link_spacings: float = 2.5
-    least_surrounded: float = 0.8
-    """Share of a cluster's links to other points that must lead to the object's."""
-    enclosed: float = 0.75
-    """Probability that such a cluster gets."""
-
 
 DEFAULT = GeometricRule()
 
@@ -80,7 +47,7 @@ def classify(
     evidence = _distance_evidence(distance, tolerance, config) + masks
     evidence += _ghost_evidence(distance, votes, mesh, config)
     if crop.support is not None:
-        evidence = _keep_support(evidence, masks, points, mesh, crop.support, tolerance, config)
+        evidence = _keep_support(evidence, masks, points, mesh, crop.support, config)
     probability = 1 / (1 + np.exp(-evidence))
     near = distance < np.maximum(tolerance, config.ghost_reach * mesh.size)
     probability[_enclosed(points, probability >= 0.5, near, config)] = config.enclosed
@@ -121,7 +88,6 @@ def _keep_support(
     points_gv: PointCloud,
     mesh: PlacedMesh,
     support: SupportSurface,
-    tolerance: Float[np.ndarray, " n"],
     config: GeometricRule,
 ) -> Float[np.ndarray, " n"]:
     """Decide the support's layer, and what is below it, by what stands on it.
@@ -130,11 +96,13 @@ def _keep_support(
     object stands on it and it goes (the hole is filled), else masks alone may take it.
     """
     height = support.height_gv - points_gv.xyz[:, 1]
-    low = height <= tolerance
+    thickness = config.spacings * points_gv.spacing
+    low = height <= thickness
     above = points_gv.xyz[low].copy()
-    above[:, 1] = support.height_gv - 1.5 * tolerance[low]
+    # High enough to be clear of the mesh's own noise at its bottom.
+    above[:, 1] = support.height_gv - thickness[low] - config.mesh_noise * mesh.size
     under = signed_distance(above, mesh.vertices_gv, mesh.faces) < 0
-    under &= np.abs(height[low]) <= tolerance[low]
+    under &= height[low] >= -2 * thickness[low]
     out = evidence.copy()
     out[low] = np.where(under, config.distance_weight, masks[low] - config.support_weight)
     return out

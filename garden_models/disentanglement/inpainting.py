@@ -12,31 +12,15 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Float32
+from jaxtyping import Bool, Float, Float32, Int
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
+from garden_models.disentanglement.config import Inpainting
+
 Texture = Float32[np.ndarray, "h w c"]
-
-
-@dataclass(frozen=True)
-class Inpainting:
-    """Sizes in pixels of the texture."""
-
-    patch: int = 7
-    coarsest_px: int = 24
-    """Shorter side of the coarsest level."""
-    rounds: int = 4
-    components: int = 16
-    """Principal components in which patches are compared."""
-    locality: float = 0.3
-    """Price of looking far away: a patch across the texture is as unlike as one whose pixels
-    differ by this share of the texture's contrast."""
-    least_known: float = 0.6
-    """Share of a source patch that was seen; the rest are gaps of the sampling."""
-    most_sources: int = 20_000
-    seed: int = 0
+Origin = Int[np.ndarray, "h w 2"]
 
 
 def inpaint(
@@ -53,16 +37,21 @@ def inpaint(
     """
     if not known.any():
         raise ValueError("nothing of the texture is known, so there is nothing to fill it from")
-    levels = [_Level(nearest_fill(texture, known), known, hole & ~known)]
-    while min(levels[-1].known.shape) >= 2 * config.coarsest_px:
-        levels.append(_halved(levels[-1]))
-    filled = levels[-1].texture
-    for level in reversed(levels):
-        height, width = level.known.shape
-        grown = cv2.resize(filled, (width, height), interpolation=cv2.INTER_LINEAR)
-        filled = np.where(level.hole[..., None], grown.reshape(level.texture.shape), level.texture)
-        filled = _match_patches(filled, level, config)
-    return np.where(known[..., None], texture, filled).astype(np.float32)
+    out = nearest_fill(texture, known)
+    hole = hole & ~known
+    if hole.any():
+        window = _around(hole, config)
+        out[window] = _continued(_Level(out[window], known[window], hole[window]), config)
+    return out
+
+
+def _around(hole: Bool[np.ndarray, "h w"], config: Inpainting) -> tuple[slice, slice]:
+    """Return rows and columns of the hole and what lies about its own size around it."""
+    ranges = []
+    for index, length in zip(np.nonzero(hole), hole.shape, strict=True):
+        margin = max(int(config.context * np.ptp(index)), 4 * config.patch)
+        ranges.append(slice(max(0, index.min() - margin), min(length, index.max() + margin + 1)))
+    return ranges[0], ranges[1]
 
 
 @dataclass(frozen=True)
@@ -72,6 +61,51 @@ class _Level:
     texture: Texture
     known: Bool[np.ndarray, "h w"]
     hole: Bool[np.ndarray, "h w"]
+
+
+def _continued(level: _Level, config: Inpainting) -> Texture:
+    """Return the texture with the hole filled coarse to fine."""
+    levels = [level]
+    while min(levels[-1].known.shape) >= 2 * config.coarsest_px:
+        levels.append(_halved(levels[-1]))
+    levels[-1] = _started(levels[-1], config)
+    origin = _identity(levels[-1].known.shape)
+    for fineness, one in enumerate(reversed(levels)):
+        if fineness:
+            origin = _refined(origin, one)
+        # Votes find the layout at the coarsest level; finer ones only look for better grain.
+        origin = _match_patches(origin, one, 1 if fineness else config.rounds, config)
+    return level.texture[origin[..., 0], origin[..., 1]]
+
+
+def _started(level: _Level, config: Inpainting) -> _Level:
+    """Colour the hole by the nearest pixels that do not lie at its very rim.
+
+    The rim is darker than the rest where it was in the shadow of what stood there.
+    """
+    distance = distance_transform_edt(~level.hole)
+    away = level.known & (distance > config.rim_px)
+    if not away.any():
+        return level
+    start = nearest_fill(level.texture, away)
+    return _Level(np.where(level.hole[..., None], start, level.texture), level.known, level.hole)
+
+
+def _identity(shape: tuple[int, ...]) -> Origin:
+    """Return every pixel's own (row, column)."""
+    return np.moveaxis(np.indices(shape[:2]), 0, -1)
+
+
+def _refined(origin: Origin, level: _Level) -> Origin:
+    """Return where each pixel of a level comes from, given that for the level half its size.
+
+    Copies keep the grain that enlarged colours would lose.
+    """
+    row, column = np.indices(level.known.shape)
+    fine = 2 * origin[row // 2, column // 2] + np.stack([row % 2, column % 2], axis=-1)
+    fine = np.minimum(fine, np.array(level.known.shape) - 1)
+    usable = level.hole & ~level.hole[fine[..., 0], fine[..., 1]]
+    return np.where(usable[..., None], fine, np.stack([row, column], axis=-1))
 
 
 def nearest_fill(texture: Float[np.ndarray, "h w c"], known: Bool[np.ndarray, "h w"]) -> Texture:
@@ -97,33 +131,43 @@ def _halved(level: _Level) -> _Level:
     return _Level((total / share[..., None]).astype(np.float32), share >= 0.25, hole > 0.5)
 
 
-def _match_patches(filled: Texture, level: _Level, config: Inpainting) -> Texture:
-    """Refine the hole at one level by the patches outside of it that are mostly known."""
+def _match_patches(origin: Origin, level: _Level, rounds: int, config: Inpainting) -> Origin:
+    """Improve where the hole's pixels come from, by patches outside of it that are mostly known."""
     size = config.patch
     if min(level.known.shape) <= size or not level.hole.any():
-        return filled
+        return origin
     touched = sliding_window_view(level.hole, (size, size)).any(axis=(2, 3))
     share = sliding_window_view(level.known, (size, size)).mean(axis=(2, 3))
     sources = np.argwhere(~touched & (share >= config.least_known))
     if len(sources) < 4 * config.components:
-        return filled
+        return origin
     if len(sources) > config.most_sources:
         rng = np.random.default_rng(config.seed)
         sources = sources[np.sort(rng.permutation(len(sources))[: config.most_sources])]
     wanted = np.argwhere(touched)
     trust = _distance_weight(level.hole)
+    filled = level.texture[origin[..., 0], origin[..., 1]]
     patches = _patches(filled, sources, size)
     mean = patches.mean(axis=0)
     some = patches[:: max(1, len(patches) // 2000)] - mean
-    axes = np.linalg.svd(some, full_matrices=False)[2][: config.components].T
+    axes = np.linalg.eigh(some.T @ some)[1][:, -config.components :]
     contrast = float(np.sqrt(((patches - mean) ** 2).sum(axis=1).mean()))
     per_pixel = config.locality * contrast / max(level.known.shape)
     tree = cKDTree(np.hstack([(patches - mean) @ axes, per_pixel * sources]))
-    for _ in range(config.rounds):
+    found = sources[:1]
+    for turn in range(rounds):
         features = (_patches(filled, wanted, size) - mean) @ axes
-        distance, best = tree.query(np.hstack([features, per_pixel * wanted]), workers=-1)
-        filled = _voted(filled, level.hole, wanted, sources[best], distance, trust, size)
-    return filled
+        distance, best = tree.query(
+            np.hstack([features, per_pixel * wanted]), eps=config.approximation
+        )
+        found = sources[best]
+        if turn < rounds - 1:
+            filled = _voted(filled, level.hole, wanted, found, distance, trust, size)
+    middle = size // 2
+    own = level.hole[wanted[:, 0] + middle, wanted[:, 1] + middle]
+    out = origin.copy()
+    out[wanted[own, 0] + middle, wanted[own, 1] + middle] = found[own] + middle
+    return out
 
 
 def _patches(texture: Texture, corners: np.ndarray, size: int) -> Float32[np.ndarray, "n p"]:

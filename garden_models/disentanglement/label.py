@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Bool, Float
 
+from garden_models.disentanglement.config import LabelPoints
 from garden_models.disentanglement.protocol import Crop, PlacedMesh, ViewEvidence, classifier
 from garden_models.geometry.rigid import homogeneous, invert_rigid, transform_points
 from garden_models.progress import Progress, silent
@@ -22,18 +21,6 @@ from garden_models.scene import (
     Reconstruction,
     Verdict,
 )
-
-
-@dataclass(frozen=True)
-class LabelPoints:
-    """Which classifier labels which points."""
-
-    method: str = "geometric"
-    threshold: float = 0.5
-    relaxed: float = 0.35
-    """The box of the mesh grows by this share of its size on every side but below (paper:
-    relaxed 3D region by gravity-aligned box expansion)."""
-    most_views: int = 40
 
 
 def label_points(

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from garden_models.disentanglement.config import LookUp
 from garden_models.geometry.camera import inside_image, project
 
 
@@ -27,27 +28,15 @@ class PhotoView:
 
 
 @dataclass(frozen=True)
-class LookUp:
-    """What counts as seen."""
-
-    depth_tolerance: float = 0.015
-    """Relative error of depth maps."""
-    mask_margin: float = 0.01
-    """Objects' masks grow by this share of the picture's width: rims are mixed colours."""
-    most_spread: float = 25.0
-    """Median deviation (of 255) over which photos without depth do not agree on a colour."""
-    least_unsure: int = 3
-    """Photos that must agree on a colour where none has depth there."""
-
-
-@dataclass(frozen=True)
 class Seen:
-    """Per place: its colour (0..255, NaN where no photo shows it), and whether photos look
-    through it, so that nothing can be there.
+    """Per place: its colour (0..255, NaN where no photo shows it), whether photos look
+    through it, so that nothing can be there, and the share of the photos it lies in (0..1)
+    whose view of it an object blocks.
     """
 
     rgb: Float[np.ndarray, "n 3"]
     empty: Bool[np.ndarray, " n"]
+    blocked: Float[np.ndarray, " n"]
 
 
 def look_up(
@@ -64,7 +53,7 @@ def look_up(
     count = len(places_gv)
     sure = np.full((len(views), count, 3), np.nan, np.float32)
     unsure = np.full((len(views), count, 3), np.nan, np.float32)
-    through = np.zeros(count)
+    through, blocked, framed = np.zeros((3, count))
     for i, view in enumerate(views):
         height, width = view.depth.shape
         pixels, z = project(places_gv, view.K, view.camera_from_gv)
@@ -73,6 +62,8 @@ def look_up(
         grown = cv2.dilate(
             view.objects.astype(np.uint8), _disc(max(1, round(config.mask_margin * width)))
         )
+        framed[inside] += 1
+        blocked[inside] += view.objects[row, column]
         free = grown[row, column] == 0
         inside, row, column = inside[free], row[free], column[free]
         depth = view.depth[row, column]
@@ -88,7 +79,7 @@ def look_up(
     spread = _spread(unsure, unsure_rgb)
     use = (agreeing == 0) & (unsure_count >= config.least_unsure) & (spread <= config.most_spread)
     rgb[use] = unsure_rgb[use]
-    return Seen(rgb, (through >= 2) & (through > agreeing))
+    return Seen(rgb, (through >= 2) & (through > agreeing), blocked / np.maximum(framed, 1))
 
 
 def _middle(

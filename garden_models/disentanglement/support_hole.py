@@ -2,38 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy import ndimage
 
-from garden_models.disentanglement.inpainting import Inpainting, inpaint
-from garden_models.disentanglement.photo_colours import LookUp, PhotoView, look_up
+from garden_models.disentanglement.config import FillHole
+from garden_models.disentanglement.inpainting import inpaint
+from garden_models.disentanglement.photo_colours import PhotoView, look_up
 from garden_models.geometry.outline import Grid, hull_cells, inside_polygon
 from garden_models.scene import PointCloud, SupportSurface
-
-
-@dataclass(frozen=True)
-class FillHole:
-    """Lengths are relative to the points' spacing or the removed object's size."""
-
-    reach: float = 0.12
-    """How far around the object the support may lack points because of it (its shadow and
-    what it hid from low cameras)."""
-    margin: float = 0.5
-    """How far around that its texture is looked at."""
-    layer_spacings: float = 2.5
-    """Points this near to the support's plane are support."""
-    most_slope: float = 0.06
-    """Steepest lean of a support, as in its detection: three and a half degrees."""
-    mixed_cells: int = 2
-    """Cells at the hole's rim whose colours mix with the object's: they are filled anew."""
-    most_cells: int = 220
-    """Cells of the texture's longer side; cells grow beyond the spacing to keep to it."""
-    look_up: LookUp = field(default_factory=LookUp)
-    inpainting: Inpainting = field(default_factory=Inpainting)
 
 
 @dataclass(frozen=True)
@@ -46,49 +27,58 @@ class Filling:
 
 def fill_hole(
     background_gv: PointCloud,
-    removed_gv: PointCloud,
+    removed_gv: Sequence[PointCloud],
     support: SupportSurface,
     views: tuple[PhotoView, ...],
     config: FillHole = FillHole(),
 ) -> Filling | None:
-    """Return points that close the support where the object was.
+    """Return points that close the support where objects stood beside each other.
 
-    The region is the object's outline from above, grown by ``reach``, within the support;
-    filled are its cells without support points, but for those that photos look through. They
-    lie on the plane through the surrounding support points, at their spacing. Colours are
-    those of photos that see the place past the object; where none does, the texture is
-    continued. Returns None if there is too little support around.
+    The region is each object's outline from above, grown by ``reach``, and what the objects
+    hid from the photos, both within the support. Filled are its cells without support points,
+    but for those that photos look through. They lie on the plane through the surrounding
+    support points, at their spacing. Colours are those of photos that see the place past the
+    objects; where none does, the texture is continued. Returns None if there is too little
+    support around.
     """
-    low, high = np.percentile(removed_gv.xyz, [1, 99], axis=0)
-    size = float((high - low).max())
-    around = np.array([config.reach + config.margin] * 2) * size
-    near = (
-        (background_gv.xyz[:, [0, 2]] >= low[[0, 2]] - around)
-        & (background_gv.xyz[:, [0, 2]] <= high[[0, 2]] + around)
-    ).all(axis=1)
-    candidates = np.flatnonzero(near)
+    bounds = [np.percentile(one.xyz[:, [0, 2]], [1, 99], axis=0) for one in removed_gv]
+    size = max(float(np.ptp(bound, axis=0).max()) for bound in bounds)
+    low = np.min([bound[0] for bound in bounds], axis=0) - config.shadow * size
+    high = np.max([bound[1] for bound in bounds], axis=0) + config.shadow * size
+    margin = config.margin * size
+    xz = background_gv.xyz[:, [0, 2]]
+    candidates = np.flatnonzero(((xz >= low - margin) & (xz <= high + margin)).all(axis=1))
     layer = _support_layer(background_gv.subset(candidates), support, config)
     if layer is None:
         return None
     on_support = candidates[layer.members]
     points = background_gv.subset(on_support)
     spacing = float(np.median(points.spacing))
-    corners = np.stack([low[[0, 2]] - around, high[[0, 2]] + around])
-    cell = max(spacing, float(np.ptp(corners, axis=0).max()) / config.most_cells)
-    grid = Grid.around(corners, cell, margin=0, max_cells=config.most_cells)
-    region = _region(removed_gv, support, grid, config.reach * size)
-    hole, rim = _hole(points, region, grid, config)
-    if not hole.any():
+    corners = np.stack([low - margin, high + margin])
+    grid = Grid.around(corners, spacing, margin=0, max_cells=config.most_cells)
+    closed = _closed(points, grid)
+    region = _shadow(~closed, low, high, support, layer, grid, views, config)
+    for one in removed_gv:
+        region |= _outline(one, support, grid, config.reach * size)
+    cells = region & ~closed
+    if not cells.any():
         return Filling(points.subset(np.zeros(0, int)), np.zeros(len(background_gv), bool))
-    cells = hole | rim
-    seen = look_up(_cell_centres(cells, layer, grid), cell, views, config.look_up)
-    texture = _texture(points, cells, seen.rgb, grid, config)
+    seen = look_up(_cell_centres(cells, layer, grid), grid.cell, views, config.look_up)
+    shown = np.full((*grid.shape, 3), np.nan)
+    shown[cells] = seen.rgb
+    # Single cells are gaps of the sampling, not what an object hid.
+    hidden = ndimage.binary_opening(cells & np.isnan(shown[..., 0]), np.ones((2, 2)))
+    rim = _grown(hidden, config.contact * size / grid.cell) & ~hidden
+    shown[rim] = np.nan
+    texture = _texture(points, cells | rim, shown, grid, config)
     if texture is None:
         return None
     cells[cells] = ~seen.empty
+    cells |= rim & closed
     row, column, inside = grid.cells_of(points.xyz[:, [0, 2]])
     replaced = np.zeros(len(background_gv), bool)
-    replaced[on_support[inside & (rim & cells)[row, column]]] = True
+    replaced[on_support[inside & cells[row, column]]] = True
+    replaced[_fringe(background_gv, candidates, layer, cells, grid, config.contact * size)] = True
     return Filling(_cell_points(cells, texture, layer, grid), replaced)
 
 
@@ -128,10 +118,26 @@ def _support_layer(points: PointCloud, support: SupportSurface, config: FillHole
     return _Layer(np.flatnonzero(members), height, slope, centre)
 
 
-def _region(
+def _fringe(
+    background_gv: PointCloud,
+    candidates: Int[np.ndarray, " n"],
+    layer: _Layer,
+    cells: Bool[np.ndarray, "r c"],
+    grid: Grid,
+    height_m: float,
+) -> Int[np.ndarray, " m"]:
+    """Return points less than ``height_m`` over filled cells: the objects' frayed feet."""
+    xyz = background_gv.xyz[candidates]
+    row, column, inside = grid.cells_of(xyz[:, [0, 2]])
+    height = layer.y(xyz[:, [0, 2]]) - xyz[:, 1]
+    low = (height > -height_m) & (height < height_m)
+    return candidates[inside & low & cells[row, column]]
+
+
+def _outline(
     removed_gv: PointCloud, support: SupportSurface, grid: Grid, reach_m: float
 ) -> Bool[np.ndarray, "r c"]:
-    """Return the cells that the object may have hidden: its hull from above, grown."""
+    """Return the cells under an object and close around it: its hull from above, grown."""
     from_above = hull_cells(grid.count(_within(removed_gv.xyz[:, [0, 2]])) > 0)
     grown = _grown(from_above, reach_m / grid.cell)
     rows, columns = np.nonzero(grown)
@@ -143,24 +149,38 @@ def _region(
     return region
 
 
+def _shadow(
+    asked: Bool[np.ndarray, "r c"],
+    low: Float[np.ndarray, "2"],
+    high: Float[np.ndarray, "2"],
+    support: SupportSurface,
+    layer: _Layer,
+    grid: Grid,
+    views: tuple[PhotoView, ...],
+    config: FillHole,
+) -> Bool[np.ndarray, "r c"]:
+    """Return those of the asked cells between ``low`` and ``high`` that objects hid."""
+    places = _cell_centres(asked, layer, grid)
+    near = ((places[:, [0, 2]] >= low) & (places[:, [0, 2]] <= high)).all(axis=1)
+    near &= inside_polygon(places[:, [0, 2]], support.outline_gv)
+    hidden = np.zeros(len(places), bool)
+    seen = look_up(places[near], grid.cell, views, config.look_up)
+    hidden[near] = (seen.blocked >= config.least_blocked) & ~seen.empty
+    shadow = np.zeros(grid.shape, bool)
+    shadow[asked] = hidden
+    return shadow
+
+
 def _within(xz: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
     """Drop stray points: those outside of the middle 98 % on an axis."""
     low, high = np.percentile(xz, [1, 99], axis=0)
     return xz[((xz >= low) & (xz <= high)).all(axis=1)]
 
 
-def _hole(
-    points: PointCloud, region: Bool[np.ndarray, "r c"], grid: Grid, config: FillHole
-) -> tuple[Bool[np.ndarray, "r c"], Bool[np.ndarray, "r c"]]:
-    """Return the cells without support points, and the rim of the holes among them."""
-    occupied = grid.count(points.xyz[:, [0, 2]]) > 0
-    padded = np.pad(occupied, 2, mode="edge")
-    closed = ndimage.binary_closing(padded, np.ones((3, 3)))[2:-2, 2:-2]
-    hole = region & ~closed
-    # Single cells are gaps of the sampling, not holes that an object left.
-    core = ndimage.binary_opening(hole, np.ones((2, 2)))
-    rim = _grown(core, float(config.mixed_cells)) & occupied & ~hole
-    return hole, rim
+def _closed(points: PointCloud, grid: Grid) -> Bool[np.ndarray, "r c"]:
+    """Return the cells that hold support points, gaps of the sampling closed."""
+    occupied = np.pad(grid.count(points.xyz[:, [0, 2]]) > 0, 2, mode="edge")
+    return np.asarray(ndimage.binary_closing(occupied, np.ones((3, 3)))[2:-2, 2:-2])
 
 
 def _grown(cells: Bool[np.ndarray, "r c"], radius: float) -> Bool[np.ndarray, "r c"]:
@@ -174,14 +194,14 @@ def _grown(cells: Bool[np.ndarray, "r c"], radius: float) -> Bool[np.ndarray, "r
 def _texture(
     points: PointCloud,
     cells: Bool[np.ndarray, "r c"],
-    seen_rgb: Float[np.ndarray, "n 3"],
+    shown: Float[np.ndarray, "r c 3"],
     grid: Grid,
     config: FillHole,
 ) -> Float[np.ndarray, "r c 3"] | None:
     """Return the support's colours as a picture from above.
 
-    Around ``cells`` they are the points' colours, in them what photos show
-    (``seen_rgb``, NaN where nothing), and else continued from both.
+    Around ``cells`` they are the points' colours, in them what photos show (NaN where
+    nothing), and else continued from both.
     """
     row, column, inside = grid.cells_of(points.xyz[:, [0, 2]])
     flat = (row * grid.shape[1] + column)[inside]
@@ -190,10 +210,9 @@ def _texture(
     rgb = points.rgb[inside].astype(float)
     total = np.stack([np.bincount(flat, rgb[:, c], number) for c in range(3)], axis=1)
     texture = (total / np.maximum(count, 1)[:, None]).reshape(*grid.shape, 3)
-    known = (count > 0).reshape(grid.shape) & ~cells
-    shown = np.isfinite(seen_rgb[:, 0])
-    texture[cells] = np.where(shown[:, None], np.nan_to_num(seen_rgb), texture[cells])
-    known[cells] = shown
+    is_shown = cells & np.isfinite(shown[..., 0])
+    known = ((count > 0).reshape(grid.shape) & ~cells) | is_shown
+    texture[is_shown] = shown[is_shown]
     if known.sum() < 30:
         return None
     return np.asarray(inpaint(texture, known, cells & ~known, config.inpainting), float)

@@ -57,16 +57,15 @@ def outer_polygon(filled: Bool[np.ndarray, "r c"], grid: Grid, simplify: float =
     """Return the outline of the largest connected region of cells, its holes filled.
 
     The polygon follows the cells' outer edges to within a quarter cell, is simplified to
-    within ``simplify`` cells (Douglas-Peucker) and has positive ``signed_area`` in the grid's own axes.
+    within ``simplify`` cells (Douglas-Peucker) and has positive ``signed_area`` in the grid's
+    own axes.
     Raises ValueError if no cell is filled.
     """
     if not filled.any():
         raise ValueError("a polygon needs at least one filled cell")
     # Twice the resolution keeps the outline on the cells' edges instead of their centres.
     fine = np.kron(largest_region(filled), np.ones((2, 2), bool)).astype(np.uint8)
-    contours, _ = cv2.findContours(
-        np.pad(fine, 1), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
-    )
+    contours, _ = cv2.findContours(np.pad(fine, 1), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     contour = max(contours, key=cv2.contourArea)
     contour = cv2.approxPolyDP(contour, 2 * simplify, True)[:, 0].astype(np.float64)
     if len(contour) < 3:

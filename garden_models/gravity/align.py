@@ -2,32 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from garden_models.geometry.gravity_view import gv_from_world
 from garden_models.gravity import read_cue
+from garden_models.gravity.config import AlignGravity
 from garden_models.gravity.fuse import fuse_cues
 from garden_models.gravity.protocol import Cue
 from garden_models.gravity.reference_view import reference_view
 from garden_models.progress import Progress, silent
-from garden_models.scene import BadInput, GravityView, Reconstruction
-
-
-@dataclass(frozen=True)
-class AlignGravity:
-    """Which methods are asked, and from which disagreement on the result is degraded."""
-
-    methods: tuple[str, ...] = ("planes", "vanishing_points", "camera_x_axes")
-    max_disagreement_deg: float = 5.0
-
-    def __post_init__(self) -> None:
-        if not self.methods:
-            raise BadInput("align_gravity needs at least one method")
-        if not 0 < self.max_disagreement_deg <= 90:
-            raise BadInput(
-                f"max_disagreement_deg is {self.max_disagreement_deg}; it is an angle in "
-                "(0, 90] degrees"
-            )
+from garden_models.scene import GravityView, Reconstruction
 
 
 def align_gravity(

@@ -33,6 +33,8 @@ MODEL_ERROR = np.radians(1.0)
 INDEPENDENT_PHOTOS = 5.0
 """One hand takes all photos of a capture and its roll wanders slowly: however many photos
 there are, they count as this many."""
+USUAL_PHOTOS = 3.0
+"""How many photos' worth the usual steadiness counts against a capture's own."""
 PRIOR_LEVEL, PRIOR_ROLLED, PRIOR_MIXED = 0.87, 0.09, 0.04
 NO_HABIT, NO_HABIT_DIVERSE = 0.08, 0.02
 """Probability that no reading holds. Photos that look many ways and still keep one great
@@ -82,9 +84,11 @@ def reading(level: Axes, forward: Axes, note: str, share: float) -> Mode:
             break
         kept = again
     axis, _, _ = least_axis(form)
-    # Photos rolled more than usual say that this hand is less steady than assumed.
+    # The residuals tell how steady this hand is; few photos (two of them used up by the
+    # fit) leave it near what hands usually are.
     rms = float(np.sqrt(np.mean((level[kept] @ axis) ** 2)))
-    form = form / max(1.0, rms / sigma) ** 2
+    photos = min(float(kept.sum()), INDEPENDENT_PHOTOS)
+    form = form * (USUAL_PHOTOS + max(photos - 2, 0)) / (USUAL_PHOTOS + photos * (rms / sigma) ** 2)
     words = f"{note}: {kept.sum()} of {len(level)} photos within {np.degrees(rms):.1f} degrees rms"
     form = soften(form, MODEL_ERROR)
     _, sigmas, _ = least_axis(form)

@@ -29,13 +29,18 @@ Direction = Float[np.ndarray, "3"]
 
 CLIMB = 30
 STILL = 1e-9
-RIVAL_DEG = 15.0
+RIVAL_DEG = 10.0
 """A second axis this far off is another answer, not the same one less exactly."""
 RIVAL_LOG_ODDS = 1.5
 SIGN_LOG_ODDS = 1.5
 LARGE_SIGMA_DEG = 3.0
 SAME_DEG = 1.0
 SAME_SUMMIT_DEG = 0.1
+BLUR = np.radians(4.0)
+"""Modes are blurred by this before summits are compared: which reading is right must not
+hang on how exactly cues agree, for what is built is rarely as exact as it is measured."""
+OPEN_TILT = np.radians(30.0)
+SQUARE_DEG = 4.0
 OPEN_SIGMA = np.radians(15.0)
 """What a reading knows worse than this is taken from the result when the two are compared."""
 WORLD_SIGMA = np.radians(0.3)
@@ -56,8 +61,13 @@ class FusedGravity:
 
 @dataclass(frozen=True)
 class _Summit:
+    """An axis the cues agree on: ``score`` is its log probability among summits close by,
+    ``reading`` among all (modes blurred).
+    """
+
     axis: Direction
     score: float
+    reading: float
     form: Form
 
 
@@ -75,19 +85,49 @@ def _climb(cues: tuple[Cue, ...], start: Direction) -> _Summit:
         axis = again
         if moved < STILL:
             break
-    height = sum(float(np.logaddexp.reduce(c.log_likelihoods(axis[None])[0])) for c in cues)
     # A summit counts by the probability it holds, not by its height: a narrow accident among
     # many is no better founded than a broad agreement.
-    return _Summit(axis, height - float(log_density(form, axis[None])[0]), form)
+    sharp = [cue.log_likelihoods(axis[None])[0] for cue in cues]
+    score = _total(sharp) - float(log_density(form, axis[None])[0])
+    broad = [cue.log_likelihoods(axis[None], BLUR)[0] for cue in cues]
+    reading = _total(broad) - float(log_density(soften(form, BLUR), axis[None])[0])
+    for cue, logs in zip(cues, broad, strict=True):
+        reading += _frame_credit(cue, logs, cues, axis)
+    return _Summit(axis, score, reading, form)
+
+
+def _total(logs: list[Float[np.ndarray, " modes_1"]]) -> float:
+    return sum(float(np.logaddexp.reduce(log)) for log in logs)
+
+
+def _frame_credit(
+    cue: Cue, logs: Float[np.ndarray, " modes_1"], cues: tuple[Cue, ...], axis: Direction
+) -> float:
+    """Return what an upright wall gains if another cue's level directions run along it.
+
+    A horizontal surface names the vertical outright, a wall leaves it open, so the wall would
+    lose to the same wall read as a floor. But if level edges run along the wall or square to
+    it, the room's frame explains both, and which of its axes is upright is an open question.
+    """
+    best = int(np.argmax(logs))
+    if best == len(cue.modes) or least_axis(cue.modes[best].form)[1][0] < OPEN_TILT:
+        return 0.0
+    level = np.sin(np.radians(SQUARE_DEG))
+    own = [d for d in cue.directions if abs(d @ axis) < level]
+    others = [d for c in cues if c is not cue for d in c.directions if abs(d @ axis) < level]
+    for a in own:
+        for b in others:
+            angle = axis_angle_deg(a, b)
+            if min(angle, 90 - angle) < SQUARE_DEG:
+                return float(np.log(1 / BLUR))
+    return 0.0
 
 
 def _spread_deg(summits: list[_Summit], best: _Summit) -> float:
     """Return the expected angular error, with what summits close by would have said instead."""
     distinct: list[_Summit] = []
     for summit in sorted(summits, key=lambda s: -s.score):
-        if axis_angle_deg(summit.axis, best.axis) < RIVAL_DEG and all(
-            axis_angle_deg(summit.axis, other.axis) > SAME_SUMMIT_DEG for other in distinct
-        ):
+        if all(axis_angle_deg(summit.axis, other.axis) > SAME_SUMMIT_DEG for other in distinct):
             distinct.append(summit)
     mass = np.exp([summit.score - best.score for summit in distinct])
     square = [
@@ -131,18 +171,21 @@ def fuse_cues(cues: tuple[Cue, ...], max_disagreement_deg: float = 5.0) -> Fused
             "cameras; add photos of the surroundings, with a table or floor in sight"
         )
     summits = [_climb(cues, mode.axis) for cue in cues for mode in cue.modes]
-    best = max(summits, key=lambda s: s.score)
-    rivals = [s for s in summits if axis_angle_deg(s.axis, best.axis) > RIVAL_DEG]
-    lead = best.score - max((s.score for s in rivals), default=-np.inf)
+    # First which reading (of the far apart), then which axis exactly.
+    winner = max(summits, key=lambda s: s.reading)
+    near = [s for s in summits if axis_angle_deg(s.axis, winner.axis) < RIVAL_DEG]
+    rivals = [s for s in summits if axis_angle_deg(s.axis, winner.axis) >= RIVAL_DEG]
+    best = max(near, key=lambda s: s.score)
+    lead = winner.reading - max((s.reading for s in rivals), default=-np.inf)
     log_odds = sum(cue.down_log_odds(best.axis) for cue in cues)
     down = best.axis if log_odds >= 0 else -best.axis
     parts = [_evidence(cue, down, max_disagreement_deg) for cue in cues]
     evidence = tuple(part for part, _ in parts)
-    sigma = _spread_deg(summits, best)
+    sigma = _spread_deg(near, best)
 
     reasons = [why for _, why in parts if why]
     if lead < RIVAL_LOG_ODDS:
-        rival = max(rivals, key=lambda s: s.score)
+        rival = max(rivals, key=lambda s: s.reading)
         angle = axis_angle_deg(rival.axis, best.axis)
         reasons.append(f"gravity: another axis, {angle:.0f} degrees away, is nearly as likely")
     if abs(log_odds) < SIGN_LOG_ODDS:

@@ -21,6 +21,7 @@ from garden_models.geometry.direction import (
     soften,
 )
 from garden_models.geometry.plane import Plane, find_planes
+from garden_models.gravity import camera_x_axes
 from garden_models.gravity.protocol import Cue, Mode
 from garden_models.scene import GravityEvidence, Reconstruction
 
@@ -51,8 +52,6 @@ LARGE_SHARE = 0.3
 WALL_WEIGHT = 0.5
 """A wall is half the evidence for an axis that a horizontal surface is: a random axis is
 perpendicular to some plane far more easily than parallel to its normal."""
-ONLY_WALLS = 0.5
-"""Weight of reading the largest plane as a wall with nothing horizontal in sight."""
 BARE_LOG_ODDS, LADEN_LOG_ODDS = 2.0, 5.0
 """A horizontal surface that is seen from one side is a floor or a table rather than a
 ceiling, and almost surely so if things stand on the seen side."""
@@ -190,6 +189,21 @@ def candidate_axes(planes: tuple[Plane, ...]) -> list[Float[np.ndarray, "3"]]:
     return axes
 
 
+def lone_walls(planes: tuple[Plane, ...]) -> list[tuple[Form, float, str]]:
+    """Return the readings of parallel planes as walls, where nothing is perpendicular to them."""
+    readings: list[tuple[Form, float, str]] = []
+    for axis in candidate_axes(planes):
+        angles = np.array([axis_angle_deg(plane.normal, axis) for plane in planes])
+        parallel = [p for p, angle in zip(planes, angles, strict=True) if angle < PARALLEL_DEG]
+        if parallel and not np.any(90 - angles < PERPENDICULAR_DEG):
+            share = sum(p.share for p in parallel)
+            form = np.sum([p.share / share * wall_form(p) for p in parallel], axis=0)
+            walls = "one wall" if len(parallel) == 1 else f"{len(parallel)} parallel walls"
+            words = f"{walls} ({share:.0%} of points)"
+            readings.append((form, WALL_WEIGHT * share, words))
+    return readings
+
+
 def read(reconstruction: Reconstruction) -> Cue | None:
     """Return the planes' readings; None where no plane is found."""
     surfaces = dominant_surfaces(reconstruction)
@@ -204,9 +218,7 @@ def read(reconstruction: Reconstruction) -> Cue | None:
             axis = least_axis(form)[0]
         if all(axis_angle_deg(axis, least_axis(other)[0]) > KERNEL_DEG for other, _, _ in readings):
             readings.append((form, weight, words))
-    wall = max(planes, key=lambda p: p.share)
-    words = f"one wall ({wall.share:.0%} of points)"
-    readings.append((wall_form(wall), ONLY_WALLS * wall.share, words))
+    readings += lone_walls(planes)
     # Planes that hold few of the points say little about how the room is built.
     total = sum(weight for _, weight, _ in readings)
     spoken = SPOKEN * min(1.0, max(weight for _, weight, _ in readings) / LARGE_SHARE)
@@ -216,7 +228,12 @@ def read(reconstruction: Reconstruction) -> Cue | None:
         rough = probability * CARELESS_SHARE
         modes.append(Mode(form, probability - rough, words))
         modes.append(Mode(soften(form, CARELESS), rough, f"{words}, roughly"))
-    return Cue(METHOD, tuple(modes), lambda down: plane_sign(surfaces, down))
+    return Cue(
+        METHOD,
+        tuple(modes),
+        lambda down: plane_sign(surfaces, down),
+        directions=tuple(plane.normal for plane in planes),
+    )
 
 
 def plane_sign(surfaces: Surfaces, down: Float[np.ndarray, "3"]) -> float:
@@ -238,6 +255,6 @@ def plane_sign(surfaces: Surfaces, down: Float[np.ndarray, "3"]) -> float:
 
 
 def estimate(reconstruction: Reconstruction) -> GravityEvidence | None:
-    """Return gravity from the dominant planes alone, or None where there is none."""
+    """Return gravity from the planes; the cameras' habit helps to tell floors from walls."""
     cue = read(reconstruction)
-    return None if cue is None else cue.alone()
+    return None if cue is None else cue.alone(camera_x_axes.read(reconstruction))

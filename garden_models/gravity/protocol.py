@@ -20,6 +20,7 @@ from garden_models.geometry.direction import (
     least_axis,
     log_density,
     pole_form,
+    soften,
     total_sigma_deg,
 )
 from garden_models.scene import GravityEvidence, Reconstruction
@@ -61,17 +62,28 @@ class Cue:
     """A method's modes and its vote on which way along them is down.
 
     ``claims_vertical`` is False for a cue that names directions of the scene without saying
-    that one of them is upright: it then does not disagree when none is.
+    that one of them is upright: it then does not disagree when none is. ``directions`` are
+    the axes of built things that the cue has seen, upright or not.
     """
 
     method: str
     modes: tuple[Mode, ...]
     down_log_odds: SignVote = says_nothing
     claims_vertical: bool = True
+    directions: tuple[Direction, ...] = ()
 
-    def log_likelihoods(self, axes: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n modes_1"]:
-        """Return the log density of every mode at unit axes; the last column is "anywhere"."""
-        columns = [np.log(m.probability) + log_density(m.form, axes) for m in self.modes]
+    def log_likelihoods(
+        self, axes: Float[np.ndarray, "n 3"], blur_rad: float = 0.0
+    ) -> Float[np.ndarray, "n modes_1"]:
+        """Return the log density of every mode at unit axes; the last column is "anywhere".
+
+        ``blur_rad`` widens every mode first.
+        """
+        columns = [
+            np.log(m.probability)
+            + log_density(soften(m.form, blur_rad) if blur_rad else m.form, axes)
+            for m in self.modes
+        ]
         anywhere = max(1.0 - sum(m.probability for m in self.modes), 1e-6)
         return np.stack([*columns, np.full(len(axes), np.log(anywhere))], axis=1)
 

@@ -188,7 +188,10 @@ def read(reconstruction: Reconstruction) -> Cue | None:
         )
         for (form, _, words), heavy in zip(readings, heaviness, strict=True)
     )
-    return Cue(METHOD, modes, claims_vertical=False) if modes else None
+    if not modes:
+        return None
+    axes = tuple(mode.axis for mode in modes)
+    return Cue(METHOD, modes, claims_vertical=False, directions=axes)
 
 
 def estimate(reconstruction: Reconstruction) -> GravityEvidence | None:

@@ -40,6 +40,9 @@ class MeshObject:
     min_observed: float = 0.5
     """Share of the surface (without its underside) seen below which the mesh is degraded."""
 
+    min_observed_one_sided: float = 0.75
+    """The same where all views come from one side, so that the far side is a guess."""
+
     seed: int = 0
     """Seed of the point samples."""
 

@@ -31,14 +31,16 @@ class Evidence:
     ``surface`` is the weighted mean of truncated signed distances, meaningful where
     ``surface_weight`` (sum over views) is above 0. ``hull`` is the signed distance to the
     visual hull (a lower bound outside). ``voters`` counts the views that know the point.
-    ``foreign`` marks points that lie closer behind other things than behind the object's
-    own surface: unseen, they rather belong to those.
+    ``hidden`` marks points that lie behind other things in some view, ``foreign`` those that
+    lie closer behind these than behind the object's own surface: unseen, they rather belong
+    to those.
     """
 
     surface: Float[np.ndarray, " n"]
     surface_weight: Float[np.ndarray, " n"]
     hull: Float[np.ndarray, " n"]
     voters: Float[np.ndarray, " n"]
+    hidden: Bool[np.ndarray, " n"]
     foreign: Bool[np.ndarray, " n"]
 
 
@@ -62,10 +64,11 @@ def gather_evidence(
         _gather(part, prepared, truncation, outvoted_share, kept, use_depth)
         for part in torch.split(points, CHUNK)
     ]
-    surface, weight, hull, voters, foreign = (
+    surface, weight, hull, voters, behind_own, behind_other = (
         torch.cat(column).numpy() for column in zip(*parts, strict=True)
     )
-    return Evidence(surface, weight, hull, voters, foreign)
+    hidden = np.isfinite(behind_other)
+    return Evidence(surface, weight, hull, voters, hidden, behind_other < behind_own)
 
 
 @dataclass(frozen=True)
@@ -99,7 +102,7 @@ def _gather(
     kept: int,
     use_depth: bool,
 ) -> tuple[torch.Tensor, ...]:
-    """Return the fields of ``Evidence`` for a chunk of points."""
+    """Return surface, weight, hull, voters, and how far points lie behind own and other things."""
     count = len(points)
     surface, weight, voters = torch.zeros(count), torch.zeros(count), torch.zeros(count)
     largest = torch.full((kept, count), -torch.inf)
@@ -128,7 +131,7 @@ def _gather(
     rank = torch.clamp((voters * outvoted_share).long(), max=kept - 1)
     hull = torch.nan_to_num(torch.gather(largest, 0, rank[None])[0], neginf=-truncation)
     surface /= torch.clamp(weight, min=1e-9)
-    return surface, weight, hull, voters, behind_other < behind_own
+    return surface, weight, hull, voters, behind_own, behind_other
 
 
 def _project(

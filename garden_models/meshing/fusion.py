@@ -25,6 +25,7 @@ from garden_models.meshing.mirror import (
     find_mirror_plane,
 )
 from garden_models.meshing.object_view import ObjectView, depth_noise
+from garden_models.meshing.standing import extend_below, stand_on
 from garden_models.meshing.voxels import VoxelGrid
 from garden_models.progress import Progress
 from garden_models.scene import BadGeometry
@@ -38,21 +39,23 @@ SEEN_WEIGHT = 0.3
 MIRROR_WEIGHT = 0.3
 """Weight of mirrored evidence against evidence of the place itself."""
 
+MOST_VOXELS = 5_000_000
+MOST_ACTIVE = 1_500_000
+"""Most voxels in the grid, and in the hull; they bound time and memory."""
+
 ONE_SIDED_DEG = 180.0
 """A gap in the ring of cameras from which on the object has a side that no view faces."""
 
 MIRROR_GAP_DEG = 120.0
 """A gap from which on it is worth looking for a mirror plane."""
 
-CONTACT_BAND = 0.015
-"""Share of the height over which the foot is straightened down to the support."""
-
 
 @dataclass(frozen=True)
 class FusedVolume:
     """The solved field on its grid, and what was assumed to close it.
 
-    ``field`` is positive outside, in units of the truncation distance.
+    ``field`` is positive outside, in units of the truncation distance. ``foot`` is the share
+    of the height over which the object was carried straight down so that it can stand.
     """
 
     grid: VoxelGrid
@@ -61,6 +64,7 @@ class FusedVolume:
     pieces: int
     mirror: MirrorPlane | None
     back_limited: bool
+    foot: float
 
 
 @dataclass(frozen=True)
@@ -103,9 +107,10 @@ def fuse_volume(
         raise BadGeometry(
             "depth and masks of the object contradict each other everywhere; check its masks"
         )
+    foot = 0.0
     if support_height is not None:
-        field = _stand(field, grid, support_height, truncation)
-    return FusedVolume(grid, field, truncation, pieces, mirror, back_limited)
+        field, foot = stand_on(field, grid, support_height, truncation)
+    return FusedVolume(grid, field, truncation, pieces, mirror, back_limited, foot)
 
 
 def _fine_grid(
@@ -131,7 +136,12 @@ def _fine_grid(
     seen_low, seen_high = robust_bounds(points_gv)
     finest = float((seen_high - seen_low).max()) / config.max_resolution
     spacing = float(np.clip(pixel, finest, extent / config.min_resolution))
-    spacing = max(spacing, extent / (1.5 * config.max_resolution))
+    spacing = max(
+        spacing,
+        extent / (1.5 * config.max_resolution),
+        coarse.spacing * float(np.cbrt(solid.sum() / MOST_ACTIVE)),
+        float(np.cbrt(np.prod(high - low) / MOST_VOXELS)),
+    )
     pad = 2 * spacing
     if support_height is not None:
         # A layer of voxel centres lies half a voxel above the support, so that the zero
@@ -205,16 +215,12 @@ def _solve(
     value = np.where(unseen, assumed, surface)
     if mirror is not None:
         value, weight, unseen = _mirrored(active, mirror, value, weight, unseen)
-    if back_limited:
-        seen = points_gv
-        if mirror is not None:
-            seen = np.concatenate([seen, mirror.reflect(seen)])
-        low, high = robust_bounds(seen)
-        seen = seen[((seen >= low) & (seen <= high)).all(axis=1)]
-        beyond = unseen & ~within_seen(
-            active.centres_gv, seen.astype(float), support_height, truncation
-        )
-        value[beyond] = 1.0
+    # Silhouettes bound what nobody saw, but not behind the object if no view faces its back,
+    # nor behind other things: there it ends where the seen points end.
+    loose = unseen & (evidence.hidden | back_limited)
+    value[loose] = np.where(
+        _within_seen(active, loose, mirror, points_gv, support_height), value[loose], 1.0
+    )
     weight = np.where(unseen, UNKNOWN_WEIGHT, np.maximum(weight, UNKNOWN_WEIGHT))
     carved = hull > value
     value = np.where(carved, hull, value)
@@ -224,8 +230,23 @@ def _solve(
     target.ravel()[active.flat] = value
     trust.ravel()[active.flat] = weight
     if support_height is not None:
-        _extend_below(target, trust, active.grid, support_height)
+        extend_below(target, trust, active.grid, support_height)
     return solve_field(target, trust)
+
+
+def _within_seen(
+    active: _Active,
+    which: Bool[np.ndarray, " n"],
+    mirror: MirrorPlane | None,
+    points_gv: Float[np.ndarray, "n 3"],
+    support_height: float | None,
+) -> Bool[np.ndarray, " m"]:
+    """Tell which of the chosen voxels lie among the seen (and mirrored) points."""
+    low, high = robust_bounds(points_gv)
+    seen = points_gv[((points_gv >= low) & (points_gv <= high)).all(axis=1)]
+    if mirror is not None:
+        seen = np.concatenate([seen, mirror.reflect(seen)])
+    return within_seen(active.centres_gv[which], seen, support_height, active.truncation)
 
 
 def _mirrored(
@@ -247,47 +268,3 @@ def _mirrored(
     value = np.where(borrowed, value[other], np.where(empty, 1.0, value))
     weight = np.where(borrowed | empty, MIRROR_WEIGHT, weight)
     return value, weight, unseen & ~borrowed & ~empty
-
-
-def _extend_below(
-    target: Float[np.ndarray, "x y z"],
-    trust: Float[np.ndarray, "x y z"],
-    grid: VoxelGrid,
-    support_height: float,
-) -> None:
-    """Copy the lowest layer under the support, so that smoothing does not round the foot."""
-    below = _layers_below(grid, support_height)
-    if below.any() and not below.all():
-        last = int(np.flatnonzero(~below)[-1])
-        target[:, below] = target[:, last : last + 1]
-        trust[:, below] = trust[:, last : last + 1]
-
-
-def _layers_below(grid: VoxelGrid, support_height: float) -> Bool[np.ndarray, " y"]:
-    return grid.origin_gv[1] + grid.spacing * np.arange(grid.shape[1]) >= support_height
-
-
-def _stand(
-    field: Float[np.ndarray, "x y z"],
-    grid: VoxelGrid,
-    support_height: float,
-    truncation: float,
-) -> Float[np.ndarray, "x y z"]:
-    """Carry the foot straight down to the support and cut it there."""
-    below = _layers_below(grid, support_height)
-    solid_layers = np.flatnonzero((field < 0).any(axis=(0, 2)) & ~below)
-    if not len(solid_layers):
-        return field
-    field = field.copy()
-    last = int(np.flatnonzero(~below)[-1])
-    height = last - int(solid_layers[0]) + 1
-    band = max(2, round(CONTACT_BAND * height))
-    top = last - band
-    if top > solid_layers[0] and (field[:, top] < 0).any():
-        for layer in range(top + 1, last + 1):
-            field[:, layer] = np.minimum(field[:, layer], field[:, top])
-    # Mirror the lowest layer's values: the crossing then lies on the support.
-    edge = np.abs(field[:, last])
-    field[:, below] = np.maximum(edge, 0.5 * grid.spacing / truncation)[:, None]
-    field[:, last] = np.where(field[:, last] < 0, -edge, field[:, last])
-    return field

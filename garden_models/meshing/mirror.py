@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
+from scipy.spatial import cKDTree
 
 SURFACE, EMPTY, UNKNOWN = 0, 1, 2
 """What is known of a place: seen surface, seen (or carved) empty, not seen."""
@@ -19,7 +20,13 @@ LEAST_SCORE = 0.97
 side has is easily a twentieth of the surface."""
 
 LEAST_CHECKED = 0.3
-"""Share of mirrored points that must fall where something is known."""
+"""Share of telling mirrored points that must fall where something is known."""
+
+LEAST_MOVE = 0.06
+"""Points that a plane moves by less than this share of the width say nothing about it."""
+
+LEVEL = 0.8
+"""Neither do points on level faces (|normal y| above this) that meet their own face again."""
 
 YAW_STEP_DEG = 4.0
 OFFSET_STEPS = 17
@@ -61,9 +68,10 @@ def find_mirror_plane(seen_gv: Float[np.ndarray, "n 3"], look: Look) -> MirrorPl
     """
     middle = 0.5 * (seen_gv.min(axis=0) + seen_gv.max(axis=0))
     width = float(np.linalg.norm(np.ptp(seen_gv[:, [0, 2]], axis=0)))
+    seen = _Seen(seen_gv, _level(seen_gv), look, middle, LEAST_MOVE * width)
     step = 2.0 * OFFSET_REACH * width / (OFFSET_STEPS - 1)
     tried = [
-        _judge(seen_gv, look, yaw, middle, shift)
+        _judge(seen, yaw, shift)
         for yaw in np.radians(np.arange(0.0, 180.0, YAW_STEP_DEG))
         for shift in np.linspace(-OFFSET_REACH, OFFSET_REACH, OFFSET_STEPS) * width
     ]
@@ -76,7 +84,7 @@ def find_mirror_plane(seen_gv: Float[np.ndarray, "n 3"], look: Look) -> MirrorPl
             shift0 = best.offset - float(middle @ best.normal)
             for yaw in yaw0 + np.radians(YAW_STEP_DEG) * scale * np.array([-1, 0, 1]):
                 for shift in shift0 + step * scale * np.array([-1, 0, 1]):
-                    plane = _judge(seen_gv, look, yaw, middle, shift)
+                    plane = _judge(seen, yaw, shift)
                     if plane and plane.score > best.score:
                         best = plane
         if best.score >= LEAST_SCORE:
@@ -84,19 +92,36 @@ def find_mirror_plane(seen_gv: Float[np.ndarray, "n 3"], look: Look) -> MirrorPl
     return None
 
 
-def _judge(
-    seen_gv: Float[np.ndarray, "n 3"],
-    look: Look,
-    yaw: float,
-    middle: Float[np.ndarray, "3"],
-    shift: float,
-) -> MirrorPlane | None:
+@dataclass(frozen=True)
+class _Seen:
+    """Seen points, which of them lie on level faces, and how to look up mirrored places."""
+
+    points_gv: Float[np.ndarray, "n 3"]
+    level: Bool[np.ndarray, " n"]
+    look: Look
+    middle: Float[np.ndarray, "3"]
+    least_move: float
+
+
+def _level(points_gv: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
+    """Tell which points lie on level faces, by the plane through their neighbours."""
+    count = min(12, len(points_gv))
+    _, index = cKDTree(points_gv).query(points_gv, k=count)
+    near = points_gv[index] - points_gv[index].mean(axis=1, keepdims=True)
+    _, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))
+    return np.abs(vectors[:, 1, 0]) > LEVEL
+
+
+def _judge(seen: _Seen, yaw: float, shift: float) -> MirrorPlane | None:
     """Score a plane; None if too little of the mirrored points can be checked."""
     normal = np.array([np.cos(yaw), 0.0, np.sin(yaw)])
-    offset = float(middle @ normal) + shift
-    state = look(reflect(seen_gv, normal, offset))
-    surface, empty = int((state == SURFACE).sum()), int((state == EMPTY).sum())
-    if surface + empty < LEAST_CHECKED * len(seen_gv):
+    offset = float(seen.middle @ normal) + shift
+    moved = 2.0 * np.abs(seen.points_gv @ normal - offset) > seen.least_move
+    state = seen.look(reflect(seen.points_gv, normal, offset))
+    telling = moved & ~seen.level
+    surface = int((telling & (state == SURFACE)).sum())
+    empty = int((moved & (state == EMPTY)).sum())
+    if surface + empty < max(LEAST_CHECKED * telling.sum(), 1):
         return None
     gain = float((state == UNKNOWN).mean())
     return MirrorPlane(normal, offset, surface / (surface + empty), gain)

@@ -17,6 +17,7 @@ from garden_models.meshing.extent import rest_height
 from garden_models.meshing.fusion import FusedVolume, fuse_volume
 from garden_models.meshing.manifold import is_closed
 from garden_models.meshing.object_view import object_views
+from garden_models.meshing.standing import CONTACT_BANDS
 from garden_models.meshing.surface import extract_surface, simplify_surface, smooth_surface
 from garden_models.meshing.triangles import TriangleSurface, face_areas, vertex_normals
 from garden_models.progress import Progress, silent
@@ -138,6 +139,11 @@ def _completion(
         out.append("underside closed flat at the support")
     elif rest is not None:
         out.append("underside closed flat at its lowest points, which lie under its support")
+    if volume.foot > CONTACT_BANDS[0]:
+        out.append(
+            f"its lowest {volume.foot:.0%} were carried straight down to the support: what was "
+            "seen of them is too small to stand on"
+        )
     if volume.mirror is not None:
         out.append(
             "unseen parts completed by mirror symmetry in a vertical plane, which "
@@ -163,7 +169,7 @@ def _verdict(
             f"only {seen:.0%} of the surface of {masks.target.name!r} was seen in photos; "
             "its other sides are guessed"
         )
-    if volume.back_limited and volume.mirror is None:
+    if volume.back_limited and volume.mirror is None and seen < config.min_observed_one_sided:
         reasons.append(
             f"{masks.target.name!r} was photographed from one side ({views} views); the depth "
             "of its unseen back is guessed"

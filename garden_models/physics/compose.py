@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
 from garden_models.geometry.rigid import rigid, transform_points
-from garden_models.physics.convex_pieces import Convexity, convex_pieces
-from garden_models.physics.inertia import DensityPrior, mass_properties
-from garden_models.physics.levelling import MeshNoise, bottom_gv, level_pieces, noise_m
-from garden_models.physics.merge_supports import MergeSupports, merge_supports
-from garden_models.physics.separate import Separation, separate
-from garden_models.physics.support_surfaces import FindSupports, find_support_surfaces
+from garden_models.physics.config import Compose
+from garden_models.physics.convex_pieces import convex_pieces
+from garden_models.physics.inertia import mass_properties
+from garden_models.physics.levelling import bottom_gv, level_pieces, noise_m
+from garden_models.physics.merge_supports import merge_supports
+from garden_models.physics.separate import separate
+from garden_models.physics.support_surfaces import find_support_surfaces
 from garden_models.progress import Progress, silent
 from garden_models.scene import (
     OK,
@@ -29,25 +30,6 @@ from garden_models.scene import (
     SupportSurface,
     Verdict,
 )
-
-
-@dataclass(frozen=True)
-class Compose:
-    """Settings of every part of composing."""
-
-    supports: FindSupports = field(default_factory=FindSupports)
-    merge: MergeSupports = field(default_factory=MergeSupports)
-    convexity: Convexity = field(default_factory=Convexity)
-    noise: MeshNoise = field(default_factory=MeshNoise)
-    density: DensityPrior = field(default_factory=DensityPrior)
-    separation: Separation = field(default_factory=Separation)
-    friction: float = 0.5
-    """Coulomb friction of dry wood, plastic and ceramics on wood lies at 0.3 to 0.6."""
-    lowest_drop: float = 0.03
-    """An object less than this share of its size above its support is lowered onto it; a
-    placement is not more exact than that. One that hangs higher is left to fall."""
-    most_shift: float = 0.05
-    """Lifts, drops and pushes over this share of an object's size make it degraded."""
 
 
 def compose(

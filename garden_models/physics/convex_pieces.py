@@ -2,26 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import ConvexHull, QhullError
 
-from garden_models.physics.decomposition import Cutting, cut_boxes
+from garden_models.physics.config import Convexity
+from garden_models.physics.decomposition import cut_boxes
 from garden_models.physics.inertia import solid_properties
 from garden_models.scene import BadGeometry, ConvexPiece
-
-
-@dataclass(frozen=True)
-class Convexity:
-    """How colliders follow a mesh."""
-
-    cutting: Cutting = field(default_factory=Cutting)
-    most_hull_vertices: int = 64
-    """As many as MJX and MuJoCo Warp take."""
-    thinnest: float = 1e-3
-    """Pieces thinner than this share of the mesh's longest extent are dropped."""
 
 
 def convex_pieces(

@@ -20,29 +20,9 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import ConvexHull, QhullError
 
 from garden_models.geometry.rotation import yaw_gv
+from garden_models.physics.config import Cutting
 
 Points = Float[np.ndarray, "n 3"]
-
-
-@dataclass(frozen=True)
-class Cutting:
-    """How finely a mesh is cut."""
-
-    most_pieces: int = 16
-    most_empty: float = 0.08
-    """Empty space in all hulls together, relative to the mesh's volume, that may stay."""
-    least_gain: float = 0.01
-    """A part that holds less empty space than this share of the mesh's volume stays whole."""
-    positions: int = 7
-    """Planes that are tried per axis."""
-    balance: float = 0.02
-    """Price of an uneven cut, relative to the part's hull: a ring, whose first cut gains
-    nothing anywhere, is cut through the middle."""
-    surface_points: int = 3000
-    """Points that candidate hulls are made of; the pieces themselves use all."""
-    cells: int = 40
-    """Cells along the longest axis of the grid that measures how much of a hull is filled."""
-    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -68,8 +48,8 @@ class _Solid:
         """Measure the part in a box."""
         hull, area = _hull_size(self.surface[_in_box(self.surface, low, high)])
         filled = float(_in_box(self.inner, low, high).sum()) * self.cell_volume
-        # A hull rests on the noise's peaks: that layer is not empty space.
-        return _Part(low, high, hull, max(hull - filled - self.noise_m * area, 0.0))
+        # A hull rests on the noise's peaks: half that layer is not empty space.
+        return _Part(low, high, hull, max(hull - filled - self.noise_m / 2 * area, 0.0))
 
 
 def cut_boxes(

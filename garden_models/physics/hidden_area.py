@@ -62,7 +62,8 @@ class HiddenArea:
             ):
                 rays = seen[side] - centre
                 share = height / (height - below[side])
-                votes += grid.count((centre + rays * share[:, None])[:, [0, 2]]) > 0
+                hit = grid.count((centre + rays * share[:, None])[:, [0, 2]]) > 0
+                np.add(votes, hit, out=votes)
         below = residual(self.points)
         covered = grid.count(self.points[below < -band][:, [0, 2]]) > 0
         near_passed = ndimage.maximum_filter(passed, 3)

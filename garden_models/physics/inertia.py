@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from garden_models.physics.config import DensityPrior
 from garden_models.scene import BadGeometry
 
 
@@ -23,23 +24,6 @@ class SolidProperties:
     volume: float
     centroid: Float[np.ndarray, "3"]
     inertia: Float[np.ndarray, "3 3"]
-
-
-@dataclass(frozen=True)
-class DensityPrior:
-    """The assumed mean density of a thing of unknown material, in kg/m^3.
-
-    Photos do not tell mass. Of the YCB object set (Calli et al. 2015) packed food weighs 200
-    to 1000 kg per m^3 of outer volume; toys, crockery and furniture, which are mostly air
-    inside their outline, lie between 100 and 800. The prior is in the middle in ratio.
-    Accelerations at rest, sliding and tipping under gravity do not depend on it.
-    """
-
-    density: float = 400.0
-    low: float = 100.0
-    high: float = 1500.0
-    least_mass_kg: float = 0.002
-    most_mass_kg: float = 500.0
 
 
 @dataclass(frozen=True)

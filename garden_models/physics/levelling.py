@@ -9,27 +9,13 @@ and the visible mesh keeps its shape.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
 from garden_models.geometry.rigid import invert_rigid, transform_points
+from garden_models.physics.config import MeshNoise
 from garden_models.physics.convex_pieces import hull_piece
 from garden_models.scene import ConvexPiece
-
-
-@dataclass(frozen=True)
-class MeshNoise:
-    """What of a mesh is noise, relative to the object."""
-
-    of_size: float = 0.015
-    """1-sigma noise of a fused mesh relative to its longest extent is 1 to 2 %."""
-    of_height: float = 0.1
-    """Never more than this share of the height: a thin object stays an object."""
-    lowest_share: float = 0.005
-    """Share of the vertices (at least eight) whose mean height is the bottom: one spike is
-    noise, the feet of a chair are not."""
 
 
 def noise_m(vertices: Float[np.ndarray, "v 3"], noise: MeshNoise) -> float:

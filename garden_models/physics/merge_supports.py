@@ -2,28 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
 from garden_models.geometry.outline import inside_polygon, signed_area
+from garden_models.physics.config import MergeSupports
 from garden_models.physics.prism import convex_hull_2d
 from garden_models.scene import SupportSurface
 
 Vertices = Float[np.ndarray, "v 3"]
-
-
-@dataclass(frozen=True)
-class MergeSupports:
-    """When two surfaces are one. Lengths are relative to the object that stands there."""
-
-    same_height: float = 0.1
-    """Surfaces under one object that differ by less than this share of its height."""
-    foot: float = 0.1
-    """Lowest share of an object's height that counts as its footprint."""
-    least_overlap: float = 0.3
-    """Share of the footprint that must lie over a surface for it to be the same surface."""
 
 
 def merge_supports(

@@ -16,15 +16,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from garden_models.geometry.rotation import quaternion_from_matrix, rotation_between
+from garden_models.physics.config import GRAVITY, ITERATIONS, TIMESTEP
 from garden_models.physics.prism import support_prisms
 from garden_models.scene import Body, SupportSurface
 
 ZUP_FROM_GV = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Rotation from Gravity-View (y down) to a right-handed z-up frame (DESIGN, section 4)."""
 
-GRAVITY = 9.81
-TIMESTEP = 0.001
-ITERATIONS = 50
 SUPPORT_FRICTION = 0.3
 """Sliding friction of supports. MuJoCo takes the larger of two, so the body's own decides."""
 SUPPORT_THICKNESS = 0.03

@@ -14,21 +14,12 @@ import numpy as np
 from jaxtyping import Float
 
 from garden_models.geometry.rotation import quaternion_from_matrix
+from garden_models.physics.config import Separation
 from garden_models.physics.mjcf import is_free, write_mjcf
 from garden_models.scene import Body, SupportSurface
 
 Vector3 = Float[np.ndarray, "3"]
 UP_GV = np.array([0.0, -1.0, 0.0])
-
-
-@dataclass(frozen=True)
-class Separation:
-    """When bodies count as apart, in metres."""
-
-    allowed_overlap_m: float = 1e-4
-    gap_m: float = 2e-4
-    """Air left between bodies that were moved apart: under the 1 mm that would be seen."""
-    steps: int = 200
 
 
 @dataclass(frozen=True)

@@ -2,40 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from garden_models.geometry.rotation import angle_between_deg, matrix_from_quaternion
-from garden_models.physics.mjcf import TIMESTEP, is_free, write_mjcf
+from garden_models.physics.config import TIMESTEP, Simulation
+from garden_models.physics.mjcf import is_free, write_mjcf
 from garden_models.physics.poses import body_poses
 from garden_models.progress import Progress, silent
 from garden_models.scene import OK, Body, BodyMotion, SimScene, Trajectory, Verdict
-
-
-@dataclass(frozen=True)
-class Simulation:
-    """How long is simulated, and what still counts as having stood still."""
-
-    seconds: float = 10.0
-    frames_per_second: float = 50.0
-    most_tilt_deg: float = 3.0
-    most_drift: float = 0.02
-    """Largest drift of the centre of mass relative to the body's longest extent."""
-    rest_window_s: float = 1.0
-    rest_drift_m: float = 5e-4
-    rest_turn_deg: float = 0.1
-    """A body is at rest if over the last window it moved and turned less than this."""
-
-    def __post_init__(self) -> None:
-        """Refuse a simulation without frames."""
-        if self.seconds <= 0 or not 0 < self.frames_per_second <= 1 / TIMESTEP:
-            raise ValueError(
-                f"seconds must be > 0 and frames_per_second in 0..{1 / TIMESTEP:.0f}, got "
-                f"{self.seconds} and {self.frames_per_second}"
-            )
 
 
 def compile_scene(scene: SimScene) -> mujoco.MjModel:

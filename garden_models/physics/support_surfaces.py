@@ -18,33 +18,11 @@ from scipy.spatial import cKDTree
 
 from garden_models.geometry.outline import Grid, hull_cells, outer_polygon, signed_area
 from garden_models.geometry.peaks import density_peaks
+from garden_models.physics.config import FindSupports
 from garden_models.physics.hidden_area import HiddenArea
 from garden_models.scene import PointCloud, SupportSurface
 
 Points = Float[np.ndarray, "n 3"]
-
-
-@dataclass(frozen=True)
-class FindSupports:
-    """How supports are told from everything else. Lengths are relative to the points' own
-    spacing and noise, areas to the area of all points that face up.
-    """
-
-    max_slope_deg: float = 25.0
-    """Normals further than this from gravity do not face up; generous, for noisy normals."""
-    max_tilt_deg: float = 4.0
-    """How far a whole surface may lean: the error of gravity, and of floors and tables."""
-    band_sigma: float = 3.0
-    """Points this many noise levels off a surface still belong to it."""
-    min_area_share: float = 0.01
-    max_peaks: int = 16
-    cell_spacings: float = 2.5
-    """Side of a cell of the outline grid: two points of one surface are closer than this."""
-    patch_share: float = 0.05
-    """A surface of less than this share of the largest one is a patch."""
-    below_floor_share: float = 0.02
-    """Nothing lies below a floor, but for this share of all area (stray points)."""
-    max_points: int = 200_000
 
 
 @dataclass(frozen=True)
@@ -62,7 +40,7 @@ class SurfacePlane:
 def find_support_surfaces(
     points_gv: PointCloud,
     camera_centres_gv: Float[np.ndarray, "c 3"],
-    config: FindSupports = FindSupports(),  # noqa: B008 - frozen
+    config: FindSupports = FindSupports(),
     is_floor_allowed: bool = True,
 ) -> tuple[SupportSurface, ...]:
     """Return the floor, tables, shelves and seats, the largest first.

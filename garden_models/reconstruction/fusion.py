@@ -23,11 +23,10 @@ MIN_FACING = 0.15  # cosine; below it a surface's own footprint says little
 
 @dataclass(frozen=True)
 class FusedView:
-    """A photo's final depths with its colours and confidence."""
+    """A photo's final depths, whose trust is their confidence, with its colours."""
 
     depth: DepthView
     rgb: UInt8[np.ndarray, "h w 3"]
-    confidence: Float[Tensor, "h w"]
 
 
 def camera_normals(planes: Planes, frame: StereoFrame) -> Float[Tensor, "3 h w"]:
@@ -70,8 +69,9 @@ def owned_points(
     """
     frame, planes = view.depth.frame, view.depth.planes
     size = footprint.reshape(-1)
-    owned = view.depth.trust.reshape(-1) > 0
-    weight = view.confidence.reshape(-1) + 1e-3
+    confidence = view.depth.trust.reshape(-1)
+    owned = (confidence > 0) & (planes.w.reshape(-1) > 0)
+    weight = confidence + 1e-3
     colour = _colours(view.rgb, size.device) * weight
     depth_views = [other.depth for other, _, _ in others]
     for seen, (other, their_footprint, wins) in zip(
@@ -80,7 +80,7 @@ def owned_points(
         their_size = their_footprint.reshape(-1)[seen.index]
         finer = their_size <= size if wins else their_size < size
         owned &= ~(seen.agrees & finer)
-        say = (other.confidence.reshape(-1)[seen.index] + 1e-3) * seen.agrees
+        say = (seen.trust + 1e-3) * seen.agrees
         colour += _colours(other.rgb, size.device)[:, seen.index] * say
         weight = weight + say
     keep = owned.cpu().numpy()
@@ -91,7 +91,7 @@ def owned_points(
         rgb=np.clip(np.round(colour), 0, 255).astype(np.uint8),
         normal=normal.astype(np.float32),
         spacing=size.cpu().numpy()[keep].astype(np.float32),
-        confidence=view.confidence.reshape(-1).cpu().numpy()[keep].astype(np.float32),
+        confidence=confidence.clamp(0, 1).cpu().numpy()[keep].astype(np.float32),
     )
 
 
@@ -145,26 +145,29 @@ def thin(cloud: PointCloud, factor: float) -> PointCloud:
     order = np.lexsort(key.T)
     fresh = np.any(np.diff(key[order], axis=0) != 0, axis=1)
     group = np.concatenate([[0], np.cumsum(fresh)])
-    members = order
-    weight = (cloud.confidence[members] + 1e-3).astype(np.float64)
-    total = np.bincount(group, weight)
-
-    def mean(values: Float[np.ndarray, "n *c"]) -> Float[np.ndarray, "m *c"]:
-        chosen = values[members].astype(np.float64)
-        if chosen.ndim == 1:
-            return np.bincount(group, weight * chosen) / total
-        columns = [np.bincount(group, weight * column) / total for column in chosen.T]
-        return np.stack(columns, axis=1)
-
-    normal = mean(cloud.normal)
+    weight = (cloud.confidence[order] + 1e-3).astype(np.float64)
+    normal = _group_mean(cloud.normal[order], weight, group)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
+    rgb = _group_mean(cloud.rgb[order], weight, group)
     return PointCloud(
-        xyz=mean(cloud.xyz).astype(np.float32),
-        rgb=np.clip(np.round(mean(cloud.rgb)), 0, 255).astype(np.uint8),
+        xyz=_group_mean(cloud.xyz[order], weight, group).astype(np.float32),
+        rgb=np.clip(np.round(rgb), 0, 255).astype(np.uint8),
         normal=(normal / np.maximum(length, 1e-9)).astype(np.float32),
-        spacing=mean(cloud.spacing).astype(np.float32),
-        confidence=mean(cloud.confidence).astype(np.float32),
+        spacing=_group_mean(cloud.spacing[order, None], weight, group)[:, 0].astype(np.float32),
+        confidence=_group_mean(cloud.confidence[order, None], weight, group)[:, 0].astype(
+            np.float32
+        ),
     )
+
+
+def _group_mean(
+    values: Float[np.ndarray, "n c"],
+    weight: Float[np.ndarray, " n"],
+    group: Int[np.ndarray, " n"],
+) -> Float[np.ndarray, "groups c"]:
+    total = np.bincount(group, weight)
+    columns = [np.bincount(group, weight * column) / total for column in values.T]
+    return np.stack(columns, axis=1)
 
 
 def without_floaters(cloud: PointCloud, factor: float) -> PointCloud:

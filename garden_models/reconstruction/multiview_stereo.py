@@ -16,18 +16,22 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from garden_models.reconstruction.dense_stereo import DenseStereo
-from garden_models.reconstruction.partner_atlas import partner_atlas
+from garden_models.reconstruction.depth_consistency import DepthView
+from garden_models.reconstruction.depth_transfer import carry_planes
+from garden_models.reconstruction.partner_atlas import PartnerAtlas, partner_atlas
 from garden_models.reconstruction.patch_cost import PatchCost, PatchShape, Planes
 from garden_models.reconstruction.patchmatch import (
     Matched,
     attempt,
     choose_views,
+    chosen,
     propagate,
     refine_value,
     start,
     vary,
 )
-from garden_models.reconstruction.plane_fit import fit_planes, resize_planes
+from garden_models.reconstruction.plane_fit import fit_planes, resize_planes, surface_planes
+from garden_models.reconstruction.plane_smoothing import average_out_noise, follow_surroundings
 from garden_models.reconstruction.plane_sweep import sweep_planes
 from garden_models.reconstruction.semi_global import semi_global
 from garden_models.reconstruction.stereo_frame import StereoFrame, parallax_per_inverse_depth
@@ -36,6 +40,7 @@ COARSE_PATCH = PatchShape(radius=2, stride=1)
 HALF_PATCH = PatchShape(radius=4, stride=2)
 FULL_PATCH = PatchShape(radius=4, stride=2)
 SWEEP_RADIUS = 2
+REFINE_NOISE = 0.08  # see refine_value
 
 
 @dataclass(frozen=True)
@@ -76,12 +81,11 @@ def sweep_view(
     count = min(max(wanted, 32), config.max_planes)
     inverse_depths = torch.linspace(*limits, count, device=frame.grey.device)
     cost = sweep_planes(frame, partners, inverse_depths, SWEEP_RADIUS, config.best_partners)
-    smooth = semi_global(
-        cost, frame.grey, config.small_step, config.large_step, config.edge_scale
-    )
+    smooth = semi_global(cost, frame.grey, config.small_step, config.large_step, config.edge_scale)
     w = lowest_label(smooth, inverse_depths)
     tolerance = torch.full_like(w, float(inverse_depths[1] - inverse_depths[0]))
-    return fit_planes(w, frame.grey, torch.ones_like(w), tolerance, 2, 0.1)
+    even = torch.ones_like(w)
+    return fit_planes(surface_planes(w), frame.grey, even, tolerance, 0.1, rounds=2)[0]
 
 
 def lowest_label(
@@ -128,16 +132,35 @@ def half_match(
     planes = resize_planes(previous.matched.planes, frame.shape)
     views = _resized_views(previous.views, frame.shape)
     atlas = partner_atlas(frame, partners, partner_w)
-    patch_cost = PatchCost(
-        frame, atlas, HALF_PATCH, len(views), views=views.reshape(len(views), -1)
-    )
+    patch_cost = _cost(frame, atlas, HALF_PATCH, views)
     step = 1 / parallax_per_inverse_depth(frame, partners, planes.w)
     matched = start(planes, patch_cost)
     matched = propagate(matched, patch_cost, limits)
     matched = vary(matched, patch_cost, limits, step, 0.2 * step, generator)
-    matched = propagate(matched, patch_cost, limits)
-    matched = refine_value(matched, patch_cost, limits, 0.25 * step)
+    matched = follow_surroundings(matched, patch_cost, frame.grey, step, limits)
     return ViewMatch(matched, views, step)
+
+
+@torch.no_grad()
+def half_rematch(
+    frame: StereoFrame,
+    partners: list[StereoFrame],
+    previous: ViewMatch,
+    partner_views: list[DepthView],
+    limits: tuple[float, float],
+) -> ViewMatch:
+    """Match again at half size, now that every partner has slanted planes of its own to
+    offer and to be held against.
+    """
+    atlas = partner_atlas(frame, partners, [view.planes.w for view in partner_views])
+    patch_cost = _cost(frame, atlas, HALF_PATCH, previous.views)
+    matched = start(previous.matched.planes, patch_cost)
+    carried, trust = carry_planes(frame, partner_views)
+    offered = chosen(trust > 0, carried, matched.planes)
+    matched = attempt(matched, offered, patch_cost, limits)
+    matched = propagate(matched, patch_cost, limits)
+    matched = follow_surroundings(matched, patch_cost, frame.grey, previous.step, limits)
+    return ViewMatch(matched, previous.views, previous.step)
 
 
 @torch.no_grad()
@@ -145,32 +168,38 @@ def full_match(
     frame: StereoFrame,
     partners: list[StereoFrame],
     previous: ViewMatch,
-    partner_w: list[Float[Tensor, "h w"]],
     limits: tuple[float, float],
 ) -> ViewMatch:
-    """Sharpen depth jumps and refine every depth at full size."""
+    """Sharpen depth jumps and refine every depth at full size, by the photos alone."""
     planes = resize_planes(previous.matched.planes, frame.shape)
     views = _resized_views(previous.views, frame.shape)
-    atlas = partner_atlas(frame, partners, partner_w)
-    flat_views = views.reshape(len(views), -1)
-    everywhere = PatchCost(frame, atlas, FULL_PATCH, len(views), views=flat_views)
+    atlas = partner_atlas(frame, partners, None)
+    everywhere = _cost(frame, atlas, FULL_PATCH, views)
     step = 1 / parallax_per_inverse_depth(frame, partners, planes.w)
     matched = start(planes, everywhere)
-    jumps = near_jumps(planes, step, radius=3) | (matched.cost > 0.5)
+    jumps = near_jumps(planes, 2 * step, radius=3)
     index = torch.nonzero(jumps.reshape(-1))[:, 0]
     if len(index):
-        there = PatchCost(
-            frame, atlas, FULL_PATCH, len(views), index=index, views=flat_views[:, index]
-        )
-        for _ in range(2):
-            matched = propagate(matched, there, limits)
-    matched = refine_value(matched, everywhere, limits, 0.25 * step)
+        there = _cost(frame, atlas, FULL_PATCH, views, index)
+        matched = propagate(matched, there, limits)
+    matched = refine_value(matched, everywhere, 0.5 * step, REFINE_NOISE)
+    matched = average_out_noise(matched, frame.grey, step)
     return ViewMatch(matched, views, step)
 
 
-def near_jumps(
-    planes: Planes, step: Float[Tensor, "h w"], radius: int
-) -> Bool[Tensor, "h w"]:
+def _cost(
+    frame: StereoFrame,
+    atlas: PartnerAtlas,
+    shape: PatchShape,
+    views: Int[Tensor, "slots h w"],
+    index: Int[Tensor, " n"] | None = None,
+) -> PatchCost:
+    flat = views.reshape(len(views), -1)
+    chosen_views = flat if index is None else flat[:, index]
+    return PatchCost(frame, atlas, shape, len(views), index=index, views=chosen_views)
+
+
+def near_jumps(planes: Planes, step: Float[Tensor, "h w"], radius: int) -> Bool[Tensor, "h w"]:
     """Tell which pixels lie within ``radius`` of a place where the planes of two neighbours
     miss each other by more than a pixel of parallax (``step``: inverse depth of one).
     """

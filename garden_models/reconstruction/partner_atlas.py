@@ -34,9 +34,7 @@ class PartnerAtlas:
     def __len__(self) -> int:
         return self.b.shape[1]
 
-    def to_grid(
-        self, x: Tensor, y: Tensor, top: Tensor
-    ) -> tuple[Tensor, Tensor, float, float]:
+    def to_grid(self, x: Tensor, y: Tensor, top: Tensor) -> tuple[Tensor, Tensor, float, float]:
         """Return atlas coordinates in -1..1 and their scales per pixel."""
         height, width = self.image.shape[-2:]
         sx, sy = 2.0 / width, 2.0 / height

@@ -78,12 +78,22 @@ class _Slot:
     def part(self, part: slice) -> _Slot:
         if len(self.which) == 1:
             return _Slot(
-                self.which, self.base[:, part], self.along_x, self.along_y,
-                self.b, self.size, self.top,
+                self.which,
+                self.base[:, part],
+                self.along_x,
+                self.along_y,
+                self.b,
+                self.size,
+                self.top,
             )
         return _Slot(
-            self.which[part], self.base[:, part], self.along_x[:, part], self.along_y[:, part],
-            self.b[:, part], self.size[:, part], self.top[part],
+            self.which[part],
+            self.base[:, part],
+            self.along_x[:, part],
+            self.along_y[:, part],
+            self.b[:, part],
+            self.size[:, part],
+            self.top[part],
         )
 
 
@@ -123,13 +133,14 @@ class PatchCost:
     def _prepare_patches(
         self, grey: Tensor, shape: PatchShape, offsets: Tensor, index: Tensor
     ) -> None:
-        height, width = grey.shape
+        width = grey.shape[1]
         radius = shape.radius
         padded = F.pad(grey[None, None], (radius,) * 4, mode="replicate").reshape(-1)
         row, column = index // width, index % width
         stride = width + 2 * radius
         start = (row + radius) * stride + column + radius
-        patches = torch.stack([padded[start + int(dy * stride + dx)] for dx, dy in offsets.tolist()])
+        shifts = [int(dy * stride + dx) for dx, dy in offsets.tolist()]
+        patches = torch.stack([padded[start + shift] for shift in shifts])
         spatial = (offsets**2).sum(dim=1) / (2 * max(radius, 1) ** 2)
         centre = grey.reshape(-1)[index]
         weight = torch.exp(-(patches - centre).abs() / shape.colour_sigma - spatial[:, None])

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import torch
 import torch.nn.functional as F
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from garden_models.reconstruction.patch_cost import PatchCost, Planes
@@ -59,6 +59,15 @@ def neighbour_planes(matched: Matched, direction: tuple[tuple[int, int], ...]) -
     return Planes(w, gx, gy)
 
 
+def chosen(where: Bool[Tensor, "h w"], these: Planes, those: Planes) -> Planes:
+    """Return ``these`` planes where told, else ``those``."""
+    return Planes(
+        torch.where(where, these.w, those.w),
+        torch.where(where, these.gx, those.gx),
+        torch.where(where, these.gy, those.gy),
+    )
+
+
 def start(planes: Planes, patch_cost: PatchCost) -> Matched:
     """Cost the planes that a level starts from (all pixels)."""
     return Matched(planes, patch_cost(planes.flat()).view_as(planes.w))
@@ -79,13 +88,7 @@ def attempt(
     else:
         cost = torch.full_like(matched.cost, torch.inf)
         cost.view(-1)[index] = patch_cost(rival.at(index))
-    better = cost < matched.cost
-    planes = matched.planes
-    kept = Planes(
-        torch.where(better, rival.w, planes.w),
-        torch.where(better, rival.gx, planes.gx),
-        torch.where(better, rival.gy, planes.gy),
-    )
+    kept = chosen(cost < matched.cost, rival, matched.planes)
     return Matched(kept, torch.minimum(cost, matched.cost))
 
 
@@ -117,25 +120,25 @@ def vary(
 
 
 def refine_value(
-    matched: Matched,
-    patch_cost: PatchCost,
-    limits: tuple[float, float],
-    step_w: Float[Tensor, "h w"],
+    matched: Matched, patch_cost: PatchCost, step_w: Float[Tensor, "h w"], noise: float
 ) -> Matched:
-    """Move each value to the lowest point of the parabola through three costs."""
+    """Move each value to the lowest point of the parabola through three costs.
+
+    The parabola is stiffened by ``noise`` times the cost at hand, which is about the share of
+    the patch that is noise, so that bare and blurred surfaces stay where they are instead of
+    following it.
+    """
     planes = matched.planes
     lower = patch_cost(Planes(planes.w - step_w, planes.gx, planes.gy).flat())
     upper = patch_cost(Planes(planes.w + step_w, planes.gx, planes.gy).flat())
-    lower, upper = lower.view_as(planes.w), upper.view_as(planes.w)
-    bend = lower + upper - 2 * matched.cost
-    shift = torch.where(bend > 1e-6, (lower - upper) / (2 * bend.clamp(min=1e-6)), 0.0)
-    rival = Planes(planes.w + shift.clamp(-1.0, 1.0) * step_w, planes.gx, planes.gy)
-    return attempt(matched, rival, patch_cost, limits)
+    cost = matched.cost.reshape(-1)
+    bend = (lower + upper - 2 * cost).clamp(min=0) + noise * cost.clamp(max=1) + 1e-6
+    shift = ((lower - upper) / (2 * bend)).clamp(-1.0, 1.0).view_as(planes.w)
+    lowest = torch.minimum(torch.minimum(lower, upper), cost).view_as(planes.w)
+    return Matched(Planes(planes.w + shift * step_w, planes.gx, planes.gy), lowest)
 
 
-def choose_views(
-    patch_cost: PatchCost, planes: Planes, count: int
-) -> Int[Tensor, "slots h w"]:
+def choose_views(patch_cost: PatchCost, planes: Planes, count: int) -> Int[Tensor, "slots h w"]:
     """Return each pixel's ``count`` best partners, judged over its 3x3 surroundings."""
     shape = planes.w.shape
     costs = patch_cost.per_view(planes.flat()).view(-1, *shape)

@@ -23,79 +23,82 @@ def start_slopes(w: Float[Tensor, "h w"]) -> tuple[Tensor, Tensor]:
 
 
 def fit_planes(
-    w: Float[Tensor, "h w"],
+    planes: Planes,
     grey: Float[Tensor, "h w"],
     weight: Float[Tensor, "h w"],
     tolerance: Float[Tensor, "h w"],
-    radius: int,
     colour_sigma: float,
-    rounds: int = 2,
-) -> Planes:
-    """Return, per pixel, the plane through its window's inverse depths.
+    spread: int = 1,
+    rounds: int = 1,
+) -> tuple[Planes, Float[Tensor, "h w"]]:
+    """Return, per pixel, the plane through the inverse depths of 5x5 pixels around it, and
+    how much evidence it rests on (sum of weights).
 
-    Neighbours count by ``weight`` (their own trust), by likeness of grey (``colour_sigma``)
-    and by their distance from the current plane in units of ``tolerance`` (inverse depth),
-    so that another surface in the window does not bend the plane.
+    The 25 pixels are ``spread`` apart. They count by ``weight`` (their own trust), by
+    likeness of grey (``colour_sigma``) and by their distance from the current plane in units
+    of ``tolerance`` (inverse depth), so that another surface does not bend the plane.
     """
-    gx, gy = start_slopes(w)
-    value = w
+    evidence = weight
     for _ in range(rounds):
-        sums = _moments(w, grey, weight, tolerance, radius, colour_sigma, value, gx, gy)
-        value, gx, gy = _solve(sums, value, gx, gy)
-    return Planes(value, gx, gy)
+        sums = _moments(planes, grey, weight, tolerance, colour_sigma, spread)
+        planes, evidence = _solve(sums, planes), sums[0]
+    return planes, evidence
 
 
 def _moments(
-    w: Tensor,
+    planes: Planes,
     grey: Tensor,
     weight: Tensor,
     tolerance: Tensor,
-    radius: int,
     colour_sigma: float,
-    value: Tensor,
-    gx: Tensor,
-    gy: Tensor,
-) -> list[Tensor]:
-    height, width = w.shape
-    stacked = torch.stack([w, grey, weight])
-    padded = F.pad(stacked[None], (radius,) * 4, mode="replicate")[0]
-    inside = F.pad(torch.ones_like(w), (radius,) * 4)
-    sums = [torch.zeros_like(w) for _ in range(9)]
-    for dy in range(-radius, radius + 1):
-        for dx in range(-radius, radius + 1):
-            rows = slice(radius + dy, radius + dy + height)
-            columns = slice(radius + dx, radius + dx + width)
+    spread: int,
+) -> Float[Tensor, "9 h w"]:
+    height, width = grey.shape
+    reach = 2 * spread
+    stacked = torch.stack([planes.w, grey, weight])
+    padded = F.pad(stacked[None], (reach,) * 4, mode="replicate")[0]
+    padded[2] = F.pad(weight, (reach,) * 4)  # nothing beyond the border counts
+    inverse_tolerance = 1 / tolerance
+    sums = torch.zeros(9, height, width, device=grey.device)
+    for dy in range(-reach, reach + 1, spread):
+        for dx in range(-reach, reach + 1, spread):
+            rows = slice(reach + dy, reach + dy + height)
+            columns = slice(reach + dx, reach + dx + width)
             their_w, their_grey, their_weight = padded[:, rows, columns]
-            residual = their_w - (value + gx * dx + gy * dy)
-            a = their_weight * inside[rows, columns]
-            a = a * torch.exp(-(their_grey - grey).abs() / colour_sigma)
-            a = a / (1 + (residual / tolerance) ** 2) ** 2
-            terms = (a, a * dx, a * dy, a * (dx * dx), a * (dx * dy), a * (dy * dy))
-            for index, term in enumerate(terms):
-                sums[index] += term
+            residual = their_w - planes.w - planes.gx * dx - planes.gy * dy
+            unlike = (their_grey - grey).abs().mul_(-1 / colour_sigma).exp_()
+            far = (residual * inverse_tolerance).square_().add_(1)
+            a = unlike.mul_(their_weight).div_(far.square_())
             ar = a * residual
-            sums[6] += ar
-            sums[7] += ar * dx
-            sums[8] += ar * dy
+            for k, factor in enumerate((1, dx, dy, dx * dx, dx * dy, dy * dy)):
+                if factor:
+                    sums[k].add_(a, alpha=factor)
+            for k, factor in enumerate((1, dx, dy)):
+                if factor:
+                    sums[6 + k].add_(ar, alpha=factor)
     return sums
 
 
-def _solve(
-    sums: list[Tensor], value: Tensor, gx: Tensor, gy: Tensor
-) -> tuple[Tensor, Tensor, Tensor]:
+def _solve(sums: Float[Tensor, "9 h w"], planes: Planes) -> Planes:
     """Add the weighted least-squares correction to the planes (3x3 systems, Cramer)."""
     n, x, y, xx, xy, yy, r, rx, ry = sums
     ridge = 1e-3 * n + 1e-9  # keeps lone pixels at their current plane
     n, xx, yy = n + ridge, xx + ridge, yy + ridge
     c00, c01, c02 = xx * yy - xy * xy, xy * y - x * yy, x * xy - xx * y
     det = n * c00 + x * c01 + y * c02
-    safe = det.abs() > 1e-12
-    inverse = torch.where(safe, 1.0 / torch.where(safe, det, torch.ones_like(det)), 0.0)
+    inverse = torch.where(det.abs() > 1e-12, det, torch.inf).reciprocal_()
     c11, c12, c22 = n * yy - y * y, x * y - n * xy, n * xx - x * x
-    d_value = (c00 * r + c01 * rx + c02 * ry) * inverse
-    d_gx = (c01 * r + c11 * rx + c12 * ry) * inverse
-    d_gy = (c02 * r + c12 * rx + c22 * ry) * inverse
-    return value + d_value, gx + d_gx, gy + d_gy
+    return Planes(
+        planes.w + (c00 * r + c01 * rx + c02 * ry) * inverse,
+        planes.gx + (c01 * r + c11 * rx + c12 * ry) * inverse,
+        planes.gy + (c02 * r + c12 * rx + c22 * ry) * inverse,
+    )
+
+
+def surface_planes(w: Float[Tensor, "h w"]) -> Planes:
+    """Return planes through single inverse depths with one-sided slopes."""
+    gx, gy = start_slopes(w)
+    return Planes(w, gx, gy)
 
 
 def resize_planes(planes: Planes, size: tuple[int, int]) -> Planes:

@@ -63,9 +63,11 @@ def sweep_planes(
                 for partner, pair in zip(partners, pairs, strict=True)
             ]
         )
-        lowest = per_partner.topk(best, dim=0, largest=False).values if best < len(
-            partners
-        ) else per_partner
+        lowest = (
+            per_partner.topk(best, dim=0, largest=False).values
+            if best < len(partners)
+            else per_partner
+        )
         cost[start : start + len(planes)] = lowest.mean(dim=0)
     return cost
 

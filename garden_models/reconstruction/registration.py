@@ -56,7 +56,8 @@ class Registration:
     trust: CameraTrust = field(default_factory=CameraTrust)
     camera_model: str = "SIMPLE_RADIAL"  # COLMAP's name; one radial coefficient
     fewest_confirmed: int = 15  # points that a photo must share with two others
-    threads: int = 2
+    threads: int = 2  # for features and matches, whose results do not depend on them
+    mapper_threads: int = 1  # with more, COLMAP's last bits differ from run to run
     seed: int = 0
 
 
@@ -93,11 +94,11 @@ def register_unknown(
     chosen = 0
     for index, rung in enumerate(config.ladder):
         started = time.monotonic()
-        if matcher.match(rung.features, badly_connected(best, len(photos)), progress):
+        if matcher.match(rung.look, badly_connected(best, len(photos)), progress):
             matcher.write(cameras, camera_of_photo, progress)
         progress(0.9, f"placing cameras ({rung.name})")
         folder = workspace / f"rung{index}"
-        found = map_photos(rung, matcher.database, folder, config.seed, config.threads)
+        found = map_photos(rung, matcher.database, folder, config.seed, config.mapper_threads)
         models = supported_models(found, config.fewest_confirmed)
         attempts.append(attempt(rung.name, models, time.monotonic() - started))
         if models and strength(models[0]) > strength(best):
@@ -131,14 +132,14 @@ def register_known(
     known = [by_name[photo.name] for photo in photos]
     started = time.monotonic()
     matcher = PhotoMatcher(photos, config.matching, config.threads, config.seed, workspace)
-    matcher.match(config.ladder[0].features, (), progress)
+    matcher.match(config.ladder[0].look, (), progress)
     cameras = [
         opencv_camera(k, p, i + 1) for i, (k, p) in enumerate(zip(known, photos, strict=True))
     ]
     matcher.write(cameras, range(len(photos)), progress)
     progress(0.9, "triangulating points from the given cameras")
     folder = workspace / "known"
-    model = triangulate(known, photos, matcher.database, folder, config.seed, config.threads)
+    model = triangulate(known, photos, matcher.database, folder, config.seed, config.mapper_threads)
     share, matches = agreement(known, photos, matcher.database)
     tried = attempt("given cameras", [model], time.monotonic() - started)
     note = f"{share:.0%} of {matches} matching points agree with the given cameras"

@@ -90,13 +90,12 @@ def write_database(
             database.write_matches(i + 1, j + 1, pairs)
 
 
-def verify_pairs(path: Path, seed: int, threads: int, min_inliers: int = 15) -> None:
+def verify_pairs(path: Path, seed: int, threads: int, min_inlier_ratio: float = 0.0) -> None:
     """Keep the matches that agree with one epipolar geometry or homography per pair.
 
     Each pair's RANSAC starts from ``seed``, so the result does not depend on threads.
     """
-    geometry = pycolmap.TwoViewGeometryOptions()
-    geometry.min_num_inliers = min_inliers
+    geometry = pycolmap.TwoViewGeometryOptions(min_inlier_ratio=min_inlier_ratio)
     geometry.ransac.random_seed = seed
     pycolmap.geometric_verification(
         path,

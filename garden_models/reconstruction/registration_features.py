@@ -1,4 +1,4 @@
-"""Detect SIFT features, the largest first."""
+"""Detect SIFT features, the largest first; with affine shapes for wide baselines."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import pycolmap
 from jaxtyping import Float, UInt8
 
 DESCRIPTOR_UNIT = 512
@@ -30,6 +31,13 @@ class Features:
     def __len__(self) -> int:
         return len(self.keypoints)
 
+    def joined(self, more: Features) -> Features:
+        """Return these features followed by ``more``."""
+        return Features(
+            np.concatenate([self.keypoints, more.keypoints]),
+            np.concatenate([self.descriptors, more.descriptors]),
+        )
+
     def first(self, count: int) -> Features:
         """Return the ``count`` best-ranked features."""
         return Features(self.keypoints[:count], self.descriptors[:count])
@@ -46,10 +54,7 @@ def detect_features(
     of Gaussians for grey values in 0..1, half of what COLMAP uses: dark corners and plain
     walls count.
     """
-    grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
-    enlarged = 2.0 if max(grey.shape) < SMALL_PHOTO_PX else 1.0
-    if enlarged > 1:
-        grey = cv2.resize(grey, None, fx=enlarged, fy=enlarged, interpolation=cv2.INTER_CUBIC)
+    grey, enlarged = large_grey(rgb)
     sift = cv2.SIFT.create(contrastThreshold=contrast, enable_precise_upscale=True)
     found = sift.detect(grey, None)
     size = np.array([k.size for k in found])
@@ -64,6 +69,39 @@ def detect_features(
     )
     keypoints[:, :3] /= enlarged
     return Features(keypoints, root_sift(descriptors))
+
+
+def detect_affine_features(
+    rgb: UInt8[np.ndarray, "h w 3"], count: int, contrast: float = 0.01
+) -> Features:
+    """Return at most ``count`` SIFT features of affine shape, the largest first.
+
+    Each is brought to a round shape before it is described, so surfaces seen at a slant
+    still match: several times the verified matches of ``detect_features`` on neighbours of
+    a wide orbit, for three times its time (COLMAP's extractor).
+    """
+    grey, enlarged = large_grey(rgb)
+    options = pycolmap.FeatureExtractionOptions(num_threads=1)
+    options.sift.max_num_features = count
+    options.sift.estimate_affine_shape = True
+    options.sift.peak_threshold = contrast / 3  # per layer of an octave, as OpenCV divides
+    found, descriptors = pycolmap.FeatureExtractor.create(options).extract_from_uint8_array(grey)
+    if len(found) == 0:
+        return Features(np.zeros((0, 4), np.float32), np.zeros((0, 128), np.uint8))
+    keypoints = np.array(
+        [(k.x, k.y, k.compute_scale(), k.compute_orientation()) for k in found], np.float32
+    )
+    keypoints[:, :3] /= enlarged
+    order = np.lexsort((keypoints[:, 0], keypoints[:, 1], -keypoints[:, 2]))[:count]
+    return Features(keypoints[order], np.asarray(descriptors.data)[order])
+
+
+def large_grey(rgb: UInt8[np.ndarray, "h w 3"]) -> tuple[UInt8[np.ndarray, "h2 w2"], float]:
+    """Return the grey photo, doubled if it is small, and the factor."""
+    grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
+    if max(grey.shape) >= SMALL_PHOTO_PX:
+        return grey, 1.0
+    return cv2.resize(grey, None, fx=2.0, fy=2.0, interpolation=cv2.INTER_CUBIC), 2.0
 
 
 def root_sift(descriptors: Float[np.ndarray, "n 128"]) -> UInt8[np.ndarray, "n 128"]:

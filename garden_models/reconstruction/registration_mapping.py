@@ -8,6 +8,8 @@ from typing import Literal
 
 import pycolmap
 
+from garden_models.reconstruction.registration_matching import Look
+
 # COLMAP reports a rung that finds nothing as an error on standard error; the ladder's
 # attempts say it better.
 pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
@@ -23,7 +25,7 @@ class Rung:
     """
 
     name: str
-    features: int
+    look: Look
     mapper: Literal["incremental", "global"] = "incremental"
     start_inliers: int = 100
     start_angle_deg: float = 16.0
@@ -31,15 +33,18 @@ class Rung:
     pose_inliers: int = 30
 
 
+FIRST_LOOK = Look(features=4096)
+SECOND_LOOK = Look(features=8192, affine=True, max_ratio=0.9, min_inlier_ratio=0.15)
+
 LADDER = (
-    Rung("4096 features", 4096),
-    Rung("4096 features, wide start", 4096, "incremental", 50, 4.0, 1.0, 15),
-    Rung("8192 features", 8192),
-    Rung("8192 features, wide start", 8192, "incremental", 50, 4.0, 1.0, 15),
-    Rung("8192 features, global mapper", 8192, "global"),
+    Rung("4096 features", FIRST_LOOK),
+    Rung("4096 features, wide start", FIRST_LOOK, "incremental", 50, 4.0, 1.0, 15),
+    Rung("affine features", SECOND_LOOK),
+    Rung("affine features, wide start", SECOND_LOOK, "incremental", 50, 4.0, 1.0, 15),
+    Rung("affine features, global mapper", SECOND_LOOK, "global"),
 )
-"""A wide start costs a second with the matches at hand, more features a minute; so each
-level of features is tried with both."""
+"""A wide start costs a second with the matches at hand, another look a minute; so each look
+is tried with both."""
 
 
 def map_photos(

@@ -12,8 +12,13 @@ from jaxtyping import Int
 
 from garden_models.progress import Progress, silent
 from garden_models.reconstruction.registration_database import verify_pairs, write_database
-from garden_models.reconstruction.registration_features import Features, detect_features
+from garden_models.reconstruction.registration_features import (
+    Features,
+    detect_affine_features,
+    detect_features,
+)
 from garden_models.reconstruction.registration_matching import (
+    Look,
     Matching,
     Pair,
     choose_pairs,
@@ -21,6 +26,9 @@ from garden_models.reconstruction.registration_matching import (
     second_look,
 )
 from garden_models.scene import Photo
+
+NO_FEATURES = Features(np.zeros((0, 4), np.float32), np.zeros((0, 128), np.uint8))
+NO_MATCHES = np.zeros((0, 2), np.uint32)
 
 
 class PhotoMatcher:
@@ -34,26 +42,23 @@ class PhotoMatcher:
         self._config = config
         self._threads = threads
         self._seed = seed
-        self._count = 0
-        self._features: list[Features] = []
+        self._look: Look | None = None
+        self._features = [NO_FEATURES for _ in photos]
         self._matches: dict[Pair, Int[np.ndarray, "m 2"]] = {}
 
     def match(
-        self, count: int, badly_connected: Sequence[int], progress: Progress = silent
+        self, look: Look, badly_connected: Sequence[int], progress: Progress = silent
     ) -> bool:
-        """Match ``count`` features a photo; return False if that is done already.
+        """Look for features and match them; return False if this look was the last one.
 
-        The first time all pairs are matched (or those that ``choose_pairs`` takes); with
-        more features only the badly connected photos are, since features are ranked and
-        the earlier matches stay valid.
+        The first look matches all pairs (or those that ``choose_pairs`` takes), another one
+        those of badly connected photos; its features and matches join the earlier ones.
         """
-        if count == self._count:
+        if look == self._look:
             return False
-        first = self._count == 0
-        self._count = count
-        self._features = self._detect(count, progress)
-        if first:
-            pairs = choose_pairs(self._features, self._config)
+        found = self._detect(look, progress)
+        if self._look is None:
+            pairs = choose_pairs(found, look.max_ratio, self._config)
         else:
             partners = self._config.second_look_partners
             pairs = second_look(badly_connected, self._matches, len(self.photos), partners)
@@ -61,7 +66,13 @@ class PhotoMatcher:
         def matching(share: float, doing: str) -> None:
             progress(0.3 + 0.5 * share, doing)
 
-        self._matches.update(match_pairs(self._features, pairs, self._config, matching))
+        matches = match_pairs(found, pairs, look.max_ratio, self._config, matching)
+        for (i, j), indices in matches.items():
+            offset = np.array([len(self._features[i]), len(self._features[j])], np.uint32)
+            earlier = self._matches.get((i, j), NO_MATCHES)
+            self._matches[i, j] = np.concatenate([earlier, indices + offset])
+        self._features = [old.joined(new) for old, new in zip(self._features, found, strict=True)]
+        self._look = look
         return True
 
     def write(
@@ -75,7 +86,8 @@ class PhotoMatcher:
         write_database(
             self.database, self.photos, cameras, camera_of_photo, self._features, self._matches
         )
-        verify_pairs(self.database, self._seed, self._threads)
+        ratio = 0.0 if self._look is None else self._look.min_inlier_ratio
+        verify_pairs(self.database, self._seed, self._threads, ratio)
 
     def verified(self) -> dict[Pair, int]:
         """Return the number of verified matches of each pair of photo indices."""
@@ -87,9 +99,10 @@ class PhotoMatcher:
             found[min(a, b) - 1, max(a, b) - 1] = int(count)
         return found
 
-    def _detect(self, count: int, progress: Progress) -> list[Features]:
+    def _detect(self, look: Look, progress: Progress) -> list[Features]:
+        detect = detect_affine_features if look.affine else detect_features
         with ThreadPoolExecutor(self._threads) as pool:
-            jobs = [pool.submit(detect_features, photo.rgb, count) for photo in self.photos]
+            jobs = [pool.submit(detect, photo.rgb, look.features) for photo in self.photos]
             features = []
             for done, (photo, job) in enumerate(zip(self.photos, jobs, strict=True)):
                 progress(0.3 * done / len(self.photos), f"finding features in {photo.name}")

@@ -17,10 +17,24 @@ Pair = tuple[int, int]
 
 
 @dataclass(frozen=True)
+class Look:
+    """How closely photos are looked at.
+
+    ``features`` a photo, with affine shapes or without; ``max_ratio`` of the angles to the
+    best and the second best descriptor; ``min_inlier_ratio`` of a pair's matches must agree
+    with one geometry (0: their number alone counts).
+    """
+
+    features: int
+    affine: bool = False
+    max_ratio: float = 0.8
+    min_inlier_ratio: float = 0.0
+
+
+@dataclass(frozen=True)
 class Matching:
     """How descriptors are matched and which pairs are tried."""
 
-    max_ratio: float = 0.8  # of the angles to the best and the second best
     max_angle_rad: float = 0.7  # between matching descriptors
     exhaustive_up_to: int = 60  # photos; beyond it pairs are chosen
     sequential_window: int = 10  # following photos tried for each, beyond
@@ -29,7 +43,7 @@ class Matching:
     second_look_partners: int = 15  # photos that a badly connected one is matched with again
 
 
-def choose_pairs(features: Sequence[Features], config: Matching) -> list[Pair]:
+def choose_pairs(features: Sequence[Features], max_ratio: float, config: Matching) -> list[Pair]:
     """Return the pairs to match: all of them, or for many photos neighbours and look-alikes.
 
     Beyond ``exhaustive_up_to`` photos a pair is tried if the photos follow each other
@@ -43,7 +57,9 @@ def choose_pairs(features: Sequence[Features], config: Matching) -> list[Pair]:
     largest = [f.first(config.similarity_features) for f in features]
     shared = np.zeros((count, count), np.int64)
     for i, j in everything:
-        shared[i, j] = shared[j, i] = len(match_descriptors(largest[i], largest[j], config))
+        shared[i, j] = shared[j, i] = len(
+            match_descriptors(largest[i], largest[j], max_ratio, config)
+        )
     chosen = {(i, j) for i, j in everything if j - i <= config.sequential_window}
     for i in range(count):
         for j in np.argsort(-shared[i], kind="stable")[: config.similar_photos]:
@@ -72,7 +88,9 @@ def second_look(
     return sorted(chosen)
 
 
-def match_descriptors(a: Features, b: Features, config: Matching) -> Int[np.ndarray, "m 2"]:
+def match_descriptors(
+    a: Features, b: Features, max_ratio: float, config: Matching
+) -> Int[np.ndarray, "m 2"]:
     """Return index pairs that are each other's best match and pass the ratio test both ways.
 
     Descriptors are integers, so that their products are exact in float32 and the result
@@ -82,37 +100,38 @@ def match_descriptors(a: Features, b: Features, config: Matching) -> Int[np.ndar
         return np.zeros((0, 2), np.uint32)
     first = torch.from_numpy(a.descriptors).float()
     second = torch.from_numpy(b.descriptors).float()
-    index_b, distinct = best_two(first, second, config)
+    index_b, distinct = best_two(first, second, max_ratio, config)
     rows = torch.nonzero(distinct)[:, 0]
     columns, back = torch.unique(index_b[rows], return_inverse=True)
-    index_a, distinct_back = best_two(second[columns], first, config)
+    index_a, distinct_back = best_two(second[columns], first, max_ratio, config)
     mutual = (index_a[back] == rows) & distinct_back[back]
     pairs = torch.stack([rows[mutual], index_b[rows[mutual]]], dim=1)
     return pairs.numpy().astype(np.uint32)
 
 
 def best_two(
-    queries: torch.Tensor, stored: torch.Tensor, config: Matching
+    queries: torch.Tensor, stored: torch.Tensor, max_ratio: float, config: Matching
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Return each query's best stored index, and whether it is close and distinct enough."""
     if len(queries) == 0:
         return torch.zeros(0, dtype=torch.int64), torch.zeros(0, dtype=torch.bool)
     similarity, index = (queries @ stored.T).topk(2, dim=1)
     angle = torch.arccos((similarity / DESCRIPTOR_UNIT**2).clamp(max=1.0))
-    good = (angle[:, 0] < config.max_ratio * angle[:, 1]) & (angle[:, 0] < config.max_angle_rad)
+    good = (angle[:, 0] < max_ratio * angle[:, 1]) & (angle[:, 0] < config.max_angle_rad)
     return index[:, 0], good
 
 
 def match_pairs(
     features: Sequence[Features],
     pairs: Sequence[Pair],
+    max_ratio: float,
     config: Matching,
     progress: Progress = silent,
 ) -> dict[Pair, Int[np.ndarray, "m 2"]]:
     """Match all pairs; pairs without any match are left out."""
     found: dict[Pair, Int[np.ndarray, "m 2"]] = {}
     for done, (i, j) in enumerate(pairs):
-        matches = match_descriptors(features[i], features[j], config)
+        matches = match_descriptors(features[i], features[j], max_ratio, config)
         if len(matches):
             found[i, j] = matches
         progress((done + 1) / len(pairs), f"matching photos ({done + 1} of {len(pairs)} pairs)")

@@ -56,9 +56,7 @@ def undistort(
     return cv2.remap(small, map_x, map_y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
 
 
-def working_views(
-    capture: Capture, sparse: SparseModel, long_side: int
-) -> tuple[WorkingView, ...]:
+def working_views(capture: Capture, sparse: SparseModel, long_side: int) -> tuple[WorkingView, ...]:
     """Return the registered photos, in the order of ``sparse.cameras``, at the working size.
 
     Raises BadInput if a camera names a photo that the capture lacks.

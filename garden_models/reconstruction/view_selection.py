@@ -58,9 +58,7 @@ def pair_weights(
     return weights
 
 
-def choose_partners(
-    weights: Float[np.ndarray, "cameras points"], count: int
-) -> tuple[int, ...]:
+def choose_partners(weights: Float[np.ndarray, "cameras points"], count: int) -> tuple[int, ...]:
     """Pick up to ``count`` partners greedily, best first, so that together they cover the
     photo's points rather than its best corner ``count`` times.
     """

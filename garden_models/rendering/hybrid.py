@@ -6,19 +6,16 @@ Colours are those of the photos, which carry their shading, so meshes are not li
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Float32, Int32, UInt8
 
 from garden_models.geometry.rigid import homogeneous, invert_rigid, transform_points
+from garden_models.rendering.config import Drawing
 from garden_models.rendering.rasterise import interpolate, rasterise_mesh
-from garden_models.rendering.splat import SplatRaster, Splatting, splat_points
+from garden_models.rendering.splat import SplatRaster, splat_points
 from garden_models.scene import Body, PointCloud
-
-NEUTRAL = (128, 128, 128)
-"""Colour of pixels where neither a mesh nor a point is seen: mid-grey, the value that is
-nearest to everything, so that it neither flatters nor ruins a comparison with a photo."""
 
 BACKGROUND_ID = -1
 
@@ -32,16 +29,6 @@ class Picture:
     rgb: UInt8[np.ndarray, "h w 3"]
     depth: Float32[np.ndarray, "h w"]
     object_ids: Int32[np.ndarray, "h w"]
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """How a picture is drawn."""
-
-    splatting: Splatting = field(default_factory=Splatting)
-    neutral: tuple[int, int, int] = NEUTRAL
-    smoothing: int = 2
-    """Meshes are drawn this many times finer and averaged, so that their outlines are even."""
 
 
 def render_scene(

@@ -15,38 +15,12 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from garden_models.geometry.rigid import transform_points
+from garden_models.rendering.config import Splatting
 from garden_models.rendering.pixel_ranges import expand_ranges
 from garden_models.scene import PointCloud
 
 DISCS_AT_ONCE = 1 << 18
 """Points expanded to pixels at a time (bounds memory)."""
-
-
-@dataclass(frozen=True)
-class Splatting:
-    """How points are drawn; lengths are relative to each point's own spacing."""
-
-    radius: float = 1.15
-    """Disc radius in spacings: discs of a surface sampled at that spacing, if not perfectly
-    evenly, leave no hole. Rims hardly count where discs overlap."""
-    least_radius_px: float = 0.71
-    """Half a pixel's diagonal: a far point covers at least the pixel that it falls in."""
-    most_radius: float = 0.08
-    """Largest disc radius relative to the picture's width (points right before the lens)."""
-    blend_depth: float = 1.5
-    """Discs that lie behind the nearest by less than this many spacings are of one surface."""
-    pinhole_px: int = 2
-    """Distance in pixels at which a pinhole looks for the surface around it; 0: leave them."""
-    near: float = 1e-3
-    """Least visible z-depth in metres."""
-
-    def __post_init__(self) -> None:
-        """Refuse sizes that draw nothing."""
-        if self.radius <= 0 or self.least_radius_px < 0.5:
-            raise ValueError(
-                f"radius must be > 0 and least_radius_px >= 0.5, got {self.radius} "
-                f"and {self.least_radius_px}"
-            )
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,9 @@ from jaxtyping import Bool, Float, Int, UInt8
 from garden_models.geometry.camera import pixel_grid, pixel_rays
 from garden_models.geometry.rigid import transform_points
 from garden_models.geometry.rotation import normalized
+from garden_models.rendering.config import Splatting
 from garden_models.rendering.rasterise import interpolate, rasterise_mesh
-from garden_models.rendering.splat import Splatting, splat_points
+from garden_models.rendering.splat import splat_points
 from garden_models.scene import PointCloud
 
 Picture = UInt8[np.ndarray, "h w 3"]

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from garden_models.geometry.rigid import rigid
 from garden_models.geometry.rotation import matrix_from_quaternion
 from garden_models.progress import Progress, silent
-from garden_models.rendering.hybrid import Drawing, render_scene, world_camera
+from garden_models.rendering.config import RenderViews
+from garden_models.rendering.hybrid import render_scene, world_camera
 from garden_models.rendering.splat import splat_points
 from garden_models.scene import (
     OK,
@@ -25,14 +25,6 @@ from garden_models.scene import (
     Verdict,
     View,
 )
-
-
-@dataclass(frozen=True)
-class RenderViews:
-    """Which photos are rendered, and how."""
-
-    most_views: int = 8
-    drawing: Drawing = field(default_factory=Drawing)
 
 
 def render_views(

@@ -45,8 +45,10 @@ def box_in_view(target: Target, reconstruction: Reconstruction) -> ViewBox:
     """
     names = [view.photo for view in reconstruction.views]
     if target.photo not in names:
-        state = "could not be registered" if target.photo in reconstruction.unregistered else (
-            "is not in the capture"
+        state = (
+            "could not be registered"
+            if target.photo in reconstruction.unregistered
+            else ("is not in the capture")
         )
         raise BadInput(
             f"The box of {target.name!r} is on photo {target.photo!r}, which {state}; "

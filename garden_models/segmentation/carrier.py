@@ -107,9 +107,10 @@ def _judged(
     xyz, spacing = graph.cloud.xyz, graph.cloud.spacing
     for _ in range(2):
         below = plane.residual(xyz)
-        core = _central_part(graph, evidence, evidence.inside & (below < -band))
-        if core is None:
+        found = _central_part(graph, evidence, evidence.inside & (below < -band))
+        if found is None:
             return None
+        core = found
         foot = core & (below > FOOT_SHARE * below[core].min() - 2 * band)
         standing = xyz[foot if foot.any() else core][:, [0, 2]]
         size = float(np.linalg.norm(np.ptp(xyz[core][:, [0, 2]], axis=0)))
@@ -152,7 +153,9 @@ def _height_field(
     soil = rooted[parts]
 
     size = float(np.linalg.norm(np.ptp(xyz[core][:, [0, 2]], axis=0)))
-    grid = Grid.around(xyz[:, [0, 2]], max(size / 40, float(np.median(graph.cloud.spacing))), 1, 256)
+    grid = Grid.around(
+        xyz[:, [0, 2]], max(size / 40, float(np.median(graph.cloud.spacing))), 1, 256
+    )
     row, column, _ = grid.cells_of(xyz[:, [0, 2]])
     flat = row * grid.shape[1] + column
     cells = grid.shape[0] * grid.shape[1]

@@ -48,7 +48,7 @@ class Segment:
     """Points further apart than this many spacings are not joined."""
     colour_sigma: float = 20.0
     """CIE Lab difference over which two neighbours cease to be one thing."""
-    crease_deg: float = 40.0
+    crease_deg: float = 25.0
     """Bend of a concave crease over which two neighbours cease to be one thing."""
     max_tilt_deg: float = 8.0
     """How far a local support may lean: a cushion, a book, the error of gravity."""
@@ -114,7 +114,9 @@ def segment(
     refined = _refined(scene, boxes[0], graph, candidates, labels, config, progress)
 
     progress(0.92, "collecting the object's points")
-    masks = tuple(_mask(view.depth.shape, refined, i) for i, view in enumerate(reconstruction.views))
+    masks = tuple(
+        _mask(view.depth.shape, refined, i) for i, view in enumerate(reconstruction.views)
+    )
     points = _own_points(scene, graph, candidates[0], refined)
     own = graph.cloud.subset(refined.labels.argmax(1) == 1)
     outlined = [
@@ -236,9 +238,7 @@ def _refined(
     tree = cKDTree(graph.cloud.xyz)
     wanted = labels[:, 1] > 0.4
     windows = [
-        open_window(
-            view, camera, graph.cloud, tree, wanted, box.box if i == box.box.view else None
-        )
+        open_window(view, camera, graph.cloud, tree, wanted, box.box if i == box.box.view else None)
         for i, (view, camera) in enumerate(zip(views, cameras, strict=True))
     ]
     targets: list[Float32[np.ndarray, "h w"] | None] = [None] * len(views)
@@ -249,7 +249,7 @@ def _refined(
             done = (turn + i / len(windows)) / (config.rounds + 1)
             progress(0.25 + 0.65 * done, f"refining {views[i].photo}")
             if window is not None:
-                seen_hull = (
+                seen_hull: Float32[np.ndarray, "h w"] | None = (
                     None
                     if hull is None
                     else hull.silhouette(views[i].K, cameras[i], window.rows, window.columns)

@@ -6,6 +6,7 @@ cover parts of the object without texture, where stereo found no points.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,7 +59,7 @@ def carve(
     low: Float[np.ndarray, "3"],
     high: Float[np.ndarray, "3"],
     views: tuple[View, ...],
-    cameras: list[Float[np.ndarray, "4 4"]],
+    cameras: Sequence[Float[np.ndarray, "4 4"]],
     targets: list[Float[np.ndarray, "h w"] | None],
     windows: list[tuple[slice, slice] | None],
 ) -> VisualHull:

@@ -14,6 +14,14 @@ from scipy.spatial import cKDTree
 from garden_models.scene import PointCloud
 
 NEIGHBOURS = 10
+SURROUNDINGS = 24
+"""Neighbours that tell whether a point lies in a crease: about three spacings around."""
+SHADE = 0.5
+"""Weight of lightness against hue in a colour difference: light and shadow change the first
+across one thing, seldom the second.
+"""
+BUSY = 2.0
+"""A colour edge counts from this many times the mean difference of its neighbours on."""
 SMOOTHING_PASSES = 2
 ALIKE_POWER = 8
 """Neighbours 30 degrees apart smooth each other by a third, 60 degrees apart not at all."""
@@ -50,14 +58,18 @@ def node_graph(
     """Join each point to its nearest neighbours within ``reach`` spacings.
 
     An edge is weaker the longer it is, the more its colours differ (``colour_sigma``: CIE
-    Lab units) and the deeper the crease between its points (``crease_deg``): where two
-    things touch, the surface is concave (Stein et al. 2014, "Object partitioning using
-    local convexity").
+    Lab units; lightness counts half) and the deeper the crease that its points lie in
+    (``crease_deg``: how steeply the surface rises around them): where two things touch,
+    the surface is concave (Stein et al. 2014, "Object partitioning using local convexity").
+    Normals must point out of the surfaces.
     """
     tree = cKDTree(cloud.xyz)
-    count = min(NEIGHBOURS + 1, len(cloud))
+    count = min(SURROUNDINGS + 1, len(cloud))
     distance, index = tree.query(cloud.xyz, count, workers=2)
     distance, index = distance.reshape(len(cloud), -1), index.reshape(len(cloud), -1)
+    normal = _smoothed(cloud.normal, index[:, : NEIGHBOURS + 1])
+    hollow = _hollowness(cloud.xyz, normal, index, distance)
+    distance, index = distance[:, : NEIGHBOURS + 1], index[:, : NEIGHBOURS + 1]
     first = np.repeat(np.arange(len(cloud)), index.shape[1])
     second, flat = index.ravel(), distance.ravel()
     limit = reach * np.maximum(cloud.spacing[first], cloud.spacing[second])
@@ -65,19 +77,18 @@ def node_graph(
     low, high = np.minimum(first, second)[keep], np.maximum(first, second)[keep]
     _, unique = np.unique(low * len(cloud) + high, return_index=True)
     edges = np.stack([low[unique], high[unique]], 1)
-    normal = _smoothed(cloud.normal, index)
-    span = cloud.xyz[edges[:, 1]] - cloud.xyz[edges[:, 0]]
     length = flat[keep][unique] / np.maximum(cloud.spacing[edges].mean(1), 1e-12)
 
-    lab = lab_colours(cloud.rgb)
+    lab = lab_colours(cloud.rgb) * [SHADE, 1.0, 1.0]
     colour = np.linalg.norm(lab[edges[:, 0]] - lab[edges[:, 1]], axis=1)
-    n0, n1 = normal[edges[:, 0]], normal[edges[:, 1]]
-    concave = ((n1 - n0) * span).sum(1) < 0
-    bend = np.degrees(np.arccos(np.clip((n0 * n1).sum(1), -1, 1)))
+    # On a busy texture, colours differ everywhere and say nothing of where it ends.
+    degree = np.maximum(np.bincount(edges.ravel(), minlength=len(cloud)), 1)
+    busy = np.bincount(edges.ravel(), np.repeat(colour, 2), len(cloud)) / degree
+    sigma = np.hypot(colour_sigma, BUSY * busy[edges].min(1))
     weights = np.exp(
         -((length / reach) ** 2)
-        - (colour / colour_sigma) ** 2
-        - np.where(concave, (bend / crease_deg) ** 2, 0.0)
+        - (colour / sigma) ** 2
+        - (hollow[edges].max(1) / np.sin(np.radians(crease_deg))) ** 2
     )
     smooth = PointCloud(cloud.xyz, cloud.rgb, normal, cloud.spacing, cloud.confidence)
     return NodeGraph(smooth, edges, length, weights)
@@ -87,6 +98,20 @@ def lab_colours(rgb: UInt8[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
     """Return CIE Lab colours (L 0..100, a and b about -100..100)."""
     image = np.ascontiguousarray(rgb.reshape(1, -1, 3)).astype(np.float32) / 255
     return cv2.cvtColor(image, cv2.COLOR_RGB2LAB).reshape(rgb.shape)
+
+
+def _hollowness(
+    xyz: Float[np.ndarray, "n 3"],
+    normal: Float[np.ndarray, "n 3"],
+    index: Int[np.ndarray, "n k"],
+    distance: Float[np.ndarray, "n k"],
+) -> Float[np.ndarray, " n"]:
+    """Return the mean rise of the surface around each point along its normal, relative to
+    the neighbours' distance: 0 where it is flat or bulges, up to 1 in a pit.
+    """
+    index = np.where(index < len(xyz), index, np.arange(len(xyz))[:, None])
+    rise = ((xyz[index] - xyz[:, None]) * normal[:, None]).sum(-1).mean(1)
+    return (rise / np.maximum(distance.mean(1), 1e-12)).clip(0)
 
 
 def _smoothed(

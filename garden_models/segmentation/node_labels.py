@@ -24,7 +24,7 @@ VOTE = 0.5
 """The votes of three or more views."""
 ISOLATED = 0.1
 """A node of a connected core that nothing joins to what is outside of the box."""
-COLOUR = 0.05
+COLOUR = 0.03
 """A node's colour, where the labels' colours differ fully."""
 INSIDE = 0.1
 """All nodes inside a box and above its support, together, in units of a cut across them:
@@ -35,10 +35,12 @@ CENTRE = 0.6
 """The same for the very middle of the box, as if all nodes were there."""
 LEAK = 0.3
 """A core leaks when its joints to the outside reach this share of a cut across it."""
+RISES = 3.0
+"""What stands beside the box rises above the support by more than this many bands."""
 NEAR = 0.1
 """A part cut off from the core counts as near within this share of the core's size."""
-COLOUR_ROUNDS = 2
-EXCLUSIVE = 0.2
+COLOUR_ROUNDS = 3
+EXCLUSIVE = 0.02
 """What is left of a box's claim on nodes that a rival's box claims too."""
 
 
@@ -76,11 +78,14 @@ def label_nodes(
     first candidate; ``before`` is then the last round's result.
     """
     open_to, grip = _claims(graph, candidates)
+    weights = _above_support(graph, candidates)
     drawn = np.zeros(open_to.shape)
     contested = open_to[:, 1:].sum(1)
     for k, candidate in enumerate(candidates, 1):
         share = np.where(contested == 1, 1.0, EXCLUSIVE) * open_to[:, k]
-        near, draw = _draw(graph, candidate, share, grip)
+        others = [other for other in candidates if other is not candidate]
+        alone = isolation(graph, weights, candidate, others)
+        near, draw = _draw(graph, candidate, share, alone * (1 - grip))
         drawn[:, k] += near * draw
         drawn[:, 0] += (1 - near) * draw
     drawn[:, 0] += SUPPORT * np.where(contested == 1, grip, 0.0)
@@ -98,7 +103,7 @@ def label_nodes(
         strength = total.sum(1)
         prior = total / np.maximum(strength, 1e-12)[:, None]
         prior[strength <= 0, 0] = 1.0
-        result = walk_on_graph(graph.edges, graph.weights, prior, strength, result) * open_to
+        result = walk_on_graph(graph.edges, weights, prior, strength, result) * open_to
         result /= np.maximum(result.sum(1, keepdims=True), 1e-9)
     assert result is not None
     return result
@@ -111,23 +116,52 @@ def support_grip(graph: NodeGraph, carrier: Carrier) -> Float[np.ndarray, " n"]:
     faces sideways may be the foot of what stands there.
     """
     below = carrier.below / carrier.band
-    upward = np.clip(2 * np.abs(graph.cloud.normal[:, 1]) - 0.8, 0, 1)
+    upward = np.clip((np.abs(graph.cloud.normal[:, 1]) - 0.75) / 0.2, 0, 1)
     near = np.clip(1.5 - np.abs(below), 0, 1) * upward
     return np.where(below > 1.0, 1.0, np.where(below > -0.3, np.maximum(near, 0.5), near))
 
 
-def isolation(graph: NodeGraph, candidate: Candidate) -> float:
+def isolation(
+    graph: NodeGraph,
+    weights: Float[np.ndarray, " e"],
+    candidate: Candidate,
+    others: list[Candidate],
+) -> float:
     """Return 1 where no edges lead from the core out of the box, falling to 0 with them.
 
-    Edges to the support do not count: there the core ends by its height.
+    ``weights`` are the edges' own, those to the support cut: there the core ends by its
+    height. Edges to what lies in another's box do not count either; things that touch
+    are one in this, so that none of them claims the other by being better cut off.
     """
     i, j = graph.edges.T
-    core, outside = candidate.core, ~candidate.evidence.inside
-    if candidate.carrier is not None:
-        outside = outside & (support_grip(graph, candidate.carrier) == 0)
-    joints = graph.weights[(core[i] & outside[j]) | (core[j] & outside[i])].sum()
-    across = 3 * np.sqrt(max(np.count_nonzero(core), 1))
+    core, outside = candidate.core.copy(), ~candidate.evidence.inside
+    for other in others:
+        outside &= ~other.evidence.inside
+        if (other.core & candidate.core).any():
+            core |= other.core
+    joints = weights[(core[i] & outside[j]) | (core[j] & outside[i])].sum()
+    across = 3 * np.sqrt(np.maximum(np.count_nonzero(core), 1))
     return float(np.exp(-((joints / across / LEAK) ** 2)))
+
+
+def _above_support(graph: NodeGraph, candidates: tuple[Candidate, ...]) -> Float[np.ndarray, " e"]:
+    """Return the edges' weights, those that lead to a support surface cut.
+
+    What stands on a surface is told from it by height, and by the image, not by how the
+    points of the contact hang together.
+    """
+    kept = np.ones(len(graph.cloud))
+    for k, candidate in enumerate(candidates):
+        if candidate.carrier is not None:
+            near = np.abs(candidate.carrier.below) < 1.5 * candidate.carrier.band
+            # A rival may stand on the target: its support then counts in its own box only.
+            near &= candidate.evidence.inside if k else True
+            kept *= np.where(near, 1 - support_grip(graph, candidate.carrier), 1.0)
+            # Outside of the box, what hardly rises above the support is its noise.
+            low = np.abs(candidate.carrier.below) < RISES * candidate.carrier.band
+            kept[low & ~candidate.evidence.inside] = 0.0
+    i, j = graph.edges.T
+    return graph.weights * kept[i] * kept[j]
 
 
 def _claims(
@@ -149,9 +183,12 @@ def _draw(
     graph: NodeGraph,
     candidate: Candidate,
     share: Float[np.ndarray, " n"],
-    grip: Float[np.ndarray, " n"],
+    alone: Float[np.ndarray, " n"],
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """Return how near (0..1) nodes are to a candidate's core, and how strongly it draws them."""
+    """Return how near (0..1) nodes are to a candidate's core, and how strongly it draws them.
+
+    ``alone`` (0..1) says how isolated the core is, and that a node is not of the support.
+    """
     near = np.ones(len(graph.cloud))
     core = graph.cloud.xyz[candidate.core]
     if len(core):
@@ -160,10 +197,9 @@ def _draw(
         apart = 0.8 * np.exp(-((distance / max(NEAR * size, 1e-12)) ** 2))
         near = np.where(candidate.core, 1.0, apart)
     # Counted over a surface of n nodes, a cut across it meets about sqrt(n) of them.
-    weak = 1.0 / np.sqrt(max(np.count_nonzero(share), 1))
+    weak = 1.0 / np.sqrt(np.maximum(np.count_nonzero(share), 1))
     middle = near * candidate.centrality * candidate.evidence.seen
-    alone = candidate.core * isolation(graph, candidate) * (1 - grip)
-    return near, share * (weak * (INSIDE + CENTRE * middle) + ISOLATED * alone)
+    return near, share * (weak * (INSIDE + CENTRE * middle) + ISOLATED * candidate.core * alone)
 
 
 def _vote(
@@ -184,7 +220,13 @@ def _vote(
 def _colour_evidence(
     bins: Int[np.ndarray, " n"], labels: Probabilities, area: Float[np.ndarray, " n"]
 ) -> tuple[Probabilities, Float[np.ndarray, " n"]]:
-    """Return what the nodes' colours say of their labels, and how surely (0..1)."""
-    colour = colour_posterior(colour_counts(bins, labels * area[:, None]))[bins]
+    """Return what the nodes' colours say of their labels, and how surely (0..1).
+
+    Targets are as likely as they are large, all together as likely as the background.
+    """
+    counts = colour_counts(bins, labels * area[:, None])
+    sizes = counts.sum(1)
+    sizes[0] = sizes[1:].sum()
+    colour = colour_posterior(counts, sizes / max(float(sizes.sum()), 1e-12))[bins]
     count = labels.shape[1]
-    return colour, ((count * colour.max(1) - 1) / (count - 1)).clip(0, 1)
+    return colour, (((count * colour.max(1) - 1) / (count - 1)).clip(0, 1)) ** 2

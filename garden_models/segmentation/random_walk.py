@@ -5,6 +5,11 @@ The probability of a label is the minimiser of ``sum_ij w_ij (x_i - x_j)^2 +
 sum_i s_i (x_i - p_i)^2``: neighbours with a strong edge agree, and each node is drawn to its
 prior ``p_i`` with strength ``s_i``. It is solved by conjugate gradients with Jacobi
 preconditioning; probabilities of all labels sum to 1 because the priors do.
+
+A walk blurs a border over many nodes. Walks that start from an earlier result first weaken
+the edges across which that result changes (iteratively reweighted least squares): the
+squares then act like absolute values, and the border gathers on the weakest edges, as in a
+minimal cut.
 """
 
 from __future__ import annotations
@@ -17,6 +22,8 @@ from scipy import sparse
 
 LEAST_STRENGTH = 1e-5
 """Draws nodes without any evidence to their prior, so that the system has one solution."""
+STEP = 0.05
+"""Change of probability along an edge from which on reweighting halves its weight."""
 TOLERANCE = 2e-3
 """Relative residual at which a solution is good: far finer than the threshold at 0.5."""
 MAX_ITERATIONS = 300
@@ -41,10 +48,12 @@ def walk_on_graph(
 ) -> Float[np.ndarray, "n labels"]:
     """Return label probabilities of the nodes; each edge stands once, in either direction.
 
-    ``start`` (default: the prior) is where the solver begins; it saves time if near.
+    ``start`` is an earlier result to sharpen (default: none).
     """
     count = len(prior)
     i, j = edges.T
+    if start is not None:
+        weights = weights / (1 + np.abs(start[i] - start[j]).max(1) / STEP)
     half = sparse.coo_matrix((weights, (i, j)), shape=(count, count)).tocsr()
     adjacency = (half + half.T).tocsr()
     strength = np.maximum(strength, LEAST_STRENGTH)
@@ -67,11 +76,13 @@ def walk_on_image(
 
     ``prior`` is that label's; ``start`` as for ``walk_on_graph``.
     """
+    if start is not None:
+        edges = _reweighted(edges, start)
     strength = np.maximum(strength, np.float32(LEAST_STRENGTH))
     right, down, falling, rising = edges
-    pieces = (
+    pieces: tuple[tuple[np.ndarray, tuple[slice, ...], tuple[slice, ...]], ...] = (
         (right, np.s_[:, :-1], np.s_[:, 1:]),
-        (down, np.s_[:-1], np.s_[1:]),
+        (down, np.s_[:-1, :], np.s_[1:, :]),
         (falling, np.s_[:-1, :-1], np.s_[1:, 1:]),
         (rising, np.s_[:-1, 1:], np.s_[1:, :-1]),
     )
@@ -92,6 +103,18 @@ def walk_on_image(
         diagonal,
         strength * prior,
         prior if start is None else start,
+    )
+
+
+def _reweighted(edges: ImageEdges, x: Float32[np.ndarray, "h w"]) -> ImageEdges:
+    """Weaken the edges across which ``x`` changes."""
+    right, down, falling, rising = edges
+    step = np.float32(1 / STEP)
+    return (
+        right / (1 + step * np.abs(x[:, 1:] - x[:, :-1])),
+        down / (1 + step * np.abs(x[1:] - x[:-1])),
+        falling / (1 + step * np.abs(x[1:, 1:] - x[:-1, :-1])),
+        rising / (1 + step * np.abs(x[1:, :-1] - x[:-1, 1:])),
     )
 
 

@@ -92,7 +92,7 @@ def open_window(
     node = front.index[rows, columns].copy()
     trust = np.where(node >= 0, SPLAT_TRUST, 0.0)
     node[valid] = np.where(np.isfinite(distance), nearest, -1)
-    calm = np.where(_jumps(depth, 8 * spacing), JUMP_TRUST, 1.0)
+    calm = np.where(_jumps(np.where(valid, depth, np.nan), 8 * spacing), JUMP_TRUST, 1.0)
     own = DEPTH_TRUST * view.confidence[rows, columns] * calm
     trust[valid] = own[valid]
     trust[node < 0] = 0
@@ -129,8 +129,11 @@ def label_pixels(
     (rest, target) summed over all views, ``hull`` the pixels that see into the target's
     visual hull, ``start`` the last round's result (all None in the first round).
     """
-    known = node_target[np.maximum(window.node, 0)]
-    certain = window.trust * np.abs(2 * known - 1)
+    known = np.where(window.node >= 0, node_target[np.maximum(window.node, 0)], np.nan)
+    # Points are as coarse as pixels: right where the label changes, the image knows better.
+    trust = window.trust * np.where(_jumps(known, 0.5), JUMP_TRUST, 1.0)
+    known = np.nan_to_num(known, nan=0.5)
+    certain = trust * np.abs(2 * known - 1)
     target, rest = certain * (known > 0.5), certain * (known <= 0.5) + window.background
     if hull is not None:
         target = np.where(hull, target + HULL_INSIDE, 0.0)
@@ -141,7 +144,7 @@ def label_pixels(
     mixed = OWN_COLOURS * _normalised(counts)
     if shared_colours is not None:
         mixed += (1 - OWN_COLOURS) * _normalised(shared_colours)
-    colour = colour_posterior(mixed)[window.bins, 1]
+    colour = colour_posterior(mixed, np.full(2, 0.5))[window.bins, 1]
     pull = COLOUR_STRENGTH * np.abs(2 * colour - 1)
     target, rest = target + pull * colour, rest + pull * (1 - colour)
     strength = target + rest
@@ -191,10 +194,11 @@ def _visible(
     return out
 
 
-def _jumps(depth: Float[np.ndarray, "h w"], limit: float) -> Bool[np.ndarray, "h w"]:
-    """Tell which pixels have depths further apart than ``limit`` around them (5 x 5)."""
-    high = ndimage.maximum_filter(np.where(depth > 0, depth, -np.inf), 5)
-    low = ndimage.minimum_filter(np.where(depth > 0, depth, np.inf), 5)
+def _jumps(values: Float[np.ndarray, "h w"], limit: float) -> Bool[np.ndarray, "h w"]:
+    """Tell around which pixels (5 x 5) values differ by more than ``limit``; NaN: unknown."""
+    unknown = np.isnan(values)
+    high = ndimage.maximum_filter(np.where(unknown, -np.inf, values), 5)
+    low = ndimage.minimum_filter(np.where(unknown, np.inf, values), 5)
     return np.nan_to_num(high - low, nan=0.0, posinf=0.0, neginf=0.0) > limit
 
 

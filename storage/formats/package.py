@@ -39,7 +39,10 @@ def write_package(folder: Path, files: dict[str, bytes], source: str) -> None:
     a folder that exists and is no package is never touched. Raises PackageError.
     """
     check_writable(folder)
-    staged = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        staged = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    except OSError as error:
+        raise _explained(error, folder) from error
     try:
         for name, content in files.items():
             path = staged / name

@@ -60,7 +60,10 @@ def natural_key(name: str) -> list[tuple[int, int, str]]:
 def photo_size(path: Path) -> tuple[int, int]:
     """Return (width, height) of the upright photo from its header alone."""
     with _opened(path) as image:
-        turned = image.getexif().get(ExifTags.Base.Orientation, 1) in (5, 6, 7, 8)
+        try:
+            turned = image.getexif().get(ExifTags.Base.Orientation, 1) in (5, 6, 7, 8)
+        except (OSError, SyntaxError, ValueError) as error:  # PNG may keep it at the end
+            raise _damaged(path, error) from error
         return (image.height, image.width) if turned else (image.width, image.height)
 
 
@@ -71,10 +74,10 @@ def read_photo(path: Path, max_size: int) -> PhotoFile:
     """
     with _opened(path) as image:
         original = photo_size(path)
-        focal_share = _focal_share(image)
-        image.draft("RGB", (2 * max_size, 2 * max_size))
         try:
-            upright = ImageOps.exif_transpose(image).convert("RGB")
+            focal_share = _focal_share(image)
+            image.draft("RGB", (2 * max_size, 2 * max_size))
+            upright = _eight_bit(ImageOps.exif_transpose(image)).convert("RGB")
         except (OSError, SyntaxError, ValueError) as error:
             raise _damaged(path, error) from error
     factor = min(1.0, max_size / max(original))
@@ -103,6 +106,13 @@ def _opened(path: Path) -> Iterator[Image.Image]:
         if image.width * image.height > MAX_PIXELS:
             raise _too_large(path, f"{image.width} x {image.height} pixels")
         yield image
+
+
+def _eight_bit(image: Image.Image) -> Image.Image:
+    """Return the high bytes of a 16-bit grey picture, which Pillow would clip at 255."""
+    if not image.mode.startswith("I"):
+        return image
+    return Image.fromarray((np.asarray(image).astype(np.int64) >> 8).clip(0, 255).astype(np.uint8))
 
 
 def _damaged(path: Path, error: Exception) -> UnreadableInput:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from flows.preset import Preset, read_preset
-from garden_models.physics.mjcf import ITERATIONS, TIMESTEP
+from garden_models.physics.config import ITERATIONS, TIMESTEP
 from garden_models.scene import BadInput
 
 

@@ -9,7 +9,8 @@ import pytest
 
 from garden_models.geometry.gravity_view import gv_from_world
 from garden_models.geometry.rotation import angle_between_deg
-from garden_models.gravity.align import AlignGravity, align_gravity
+from garden_models.gravity.align import align_gravity
+from garden_models.gravity.config import AlignGravity
 from garden_models.scene import BadGeometry, BadInput
 from tests.garden_models.gravity.synthetic_room import Room, cameras_only, make_room
 

@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 
 from garden_models.geometry.camera import backproject_depth, pixel_grid, pixel_rays
-from garden_models.geometry.rigid import invert_rigid, rigid, transform_points
+from garden_models.geometry.rigid import invert_rigid, rigid
 from garden_models.geometry.rotation import axis_angle
 from garden_models.meshing.ray_casting import RayCaster
 from garden_models.scene import (
@@ -152,17 +152,32 @@ def stage(
 
 
 def block() -> trimesh.Trimesh:
-    """Return an L-shaped block, 0.26 x 0.16 x 0.12 m, with no mirror plane across its length."""
-    base = trimesh.creation.box([0.26, 0.07, 0.12])
-    tower = trimesh.creation.box([0.09, 0.12, 0.12])
-    tower.apply_translation([-0.085, -0.08, 0.0])
-    knob = trimesh.creation.box([0.05, 0.05, 0.04])
-    knob.apply_translation([0.08, -0.05, 0.03])
-    joined = trimesh.boolean.union([base, tower, knob], engine="manifold")
-    joined.apply_transform(trimesh.transformations.rotation_matrix(0.5, [0, 1, 0]))
-    return joined
+    """Return an L-shaped block with a knob: 0.26 x 0.175 x 0.12 m, no mirror plane, turned."""
+    x = np.array([-0.13, -0.04, 0.055, 0.105, 0.13])
+    y = np.array([-0.14, -0.075, -0.035, 0.035])
+    z = np.array([-0.06, 0.01, 0.05, 0.06])
+    solid = np.zeros((4, 3, 3), bool)
+    solid[:, 2] = True
+    solid[0] = True
+    solid[2, 1, 1] = True
+    out = _solid_of_cells(x, y, z, solid)
+    out.apply_transform(trimesh.transformations.rotation_matrix(0.5, [0, 1, 0]))
+    return out
 
 
-def seen_from(mesh: trimesh.Trimesh, transform: np.ndarray) -> np.ndarray:
-    """Return the mesh's vertices under a 4x4 transform."""
-    return transform_points(transform, np.asarray(mesh.vertices))
+def _solid_of_cells(
+    x: np.ndarray, y: np.ndarray, z: np.ndarray, solid: np.ndarray
+) -> trimesh.Trimesh:
+    """Return the closed surface of the solid cells of a grid with lines x, y, z."""
+    lines = (x, y, z)
+    parts = []
+    for cell in np.argwhere(solid):
+        low = np.array([line[i] for line, i in zip(lines, cell, strict=True)])
+        high = np.array([line[i + 1] for line, i in zip(lines, cell, strict=True)])
+        box = trimesh.creation.box(bounds=np.stack([low, high]))
+        beyond = cell + np.rint(box.face_normals).astype(int)
+        inside = ((beyond >= 0) & (beyond < solid.shape)).all(axis=1)
+        covered = inside & solid[tuple(np.clip(beyond, 0, np.array(solid.shape) - 1).T)]
+        box.update_faces(~covered)
+        parts.append(box)
+    return trimesh.util.concatenate(parts)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from garden_models.physics.compose import compose
-from garden_models.physics.simulate import Simulation, simulate
+from garden_models.physics.config import Simulation
+from garden_models.physics.simulate import simulate
 from garden_models.scene import BadInput, Scale
 from tests.garden_models.physics import room
 

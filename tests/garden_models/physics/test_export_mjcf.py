@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from garden_models.physics.compose import compose
+from garden_models.physics.config import Simulation
 from garden_models.physics.export_mjcf import mjcf_zup
 from garden_models.physics.mjcf import ZUP_FROM_GV, write_mjcf
-from garden_models.physics.simulate import Simulation, simulate
+from garden_models.physics.simulate import simulate
 from tests.garden_models.physics import room
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from garden_models.physics.inertia import DensityPrior, mass_properties, solid_properties
+from garden_models.physics.config import DensityPrior
+from garden_models.physics.inertia import mass_properties, solid_properties
 from garden_models.scene import BadGeometry
 
 

@@ -13,11 +13,12 @@ from garden_models.geometry.rigid import homogeneous, transform_points
 from garden_models.metrics.camera_pose import camera_pose_errors
 from garden_models.reconstruction.registration import Registration, badly_connected, register
 from garden_models.reconstruction.registration_mapping import LADDER
+from garden_models.reconstruction.registration_matching import Look
 from garden_models.scene import BadInput, Capture, Photo, SparseModel
 
 from .textured_room import SIZE, noise_texture, room_capture
 
-QUICK = Registration(ladder=tuple(replace(rung, features=1000) for rung in LADDER[:2]))
+QUICK = Registration(ladder=tuple(replace(rung, look=Look(1000)) for rung in LADDER[:2]))
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +101,7 @@ def test_a_photo_of_something_else_is_named(room: Capture, tmp_path: Path) -> No
 
 def test_photos_without_overlap_fail_and_name_themselves(tmp_path: Path) -> None:
     photos = tuple(unrelated_photo(i) for i in range(4))
-    ladder = tuple(replace(rung, features=rung.features // 8) for rung in LADDER)
+    ladder = tuple(replace(r, look=replace(r.look, features=500)) for r in LADDER)
     model = register(Capture(photos), Registration(ladder=ladder), tmp_path)
     assert model.verdict.status == "failed" and len(model.verdict.reasons) == 1
     assert all(photo.name in model.verdict.reasons[0] for photo in photos)

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from garden_models.reconstruction.registration_features import (
     DESCRIPTOR_UNIT,
+    Features,
+    detect_affine_features,
     detect_features,
     root_sift,
 )
 
 from .textured_room import noise_texture
+
+Detector = Callable[[np.ndarray, int], Features]
 
 
 def blobs(width: int, height: int, centres: np.ndarray, sigma: float) -> np.ndarray:
@@ -23,10 +29,11 @@ def blobs(width: int, height: int, centres: np.ndarray, sigma: float) -> np.ndar
 
 
 @pytest.mark.parametrize("width", [600, 1200])
-def test_blobs_are_found_at_their_centres(width: int) -> None:
+@pytest.mark.parametrize("detect", [detect_features, detect_affine_features])
+def test_blobs_are_found_at_their_centres(detect: Detector, width: int) -> None:
     """Pixel centres are at +0.5, in doubled small photos too."""
     centres = np.array([[100.3, 80.7], [300.0, 200.5], [450.6, 120.2]])
-    found = detect_features(blobs(width, 300, centres, 5.0), 100).keypoints
+    found = detect(blobs(width, 300, centres, 5.0), 100).keypoints
     for centre in centres:
         assert np.linalg.norm(found[:, :2] - centre, axis=1).min() < 0.1
 
@@ -40,8 +47,9 @@ def test_fewer_features_are_a_prefix_of_more() -> None:
     assert (np.diff(many.keypoints[:, 2]) <= 0).all()
 
 
-def test_a_flat_photo_has_no_features() -> None:
-    assert len(detect_features(np.full((100, 120, 3), 90, np.uint8), 50)) == 0
+@pytest.mark.parametrize("detect", [detect_features, detect_affine_features])
+def test_a_flat_photo_has_no_features(detect: Detector) -> None:
+    assert len(detect(np.full((100, 120, 3), 90, np.uint8), 50)) == 0
 
 
 def test_descriptors_have_the_stated_length() -> None:

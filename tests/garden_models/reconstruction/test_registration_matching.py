@@ -30,7 +30,7 @@ def noisy_copy(rng: np.random.Generator, features: Features, shared: int, extra:
     return Features(keypoints[order], descriptors[order])
 
 
-def plain_matches(a: Features, b: Features, config: Matching) -> set[tuple[int, int]]:
+def plain_matches(a: Features, b: Features, ratio: float) -> set[tuple[int, int]]:
     cosine = a.descriptors.astype(float) @ b.descriptors.astype(float).T / 512**2
     angle = np.arccos(np.minimum(cosine, 1))
 
@@ -38,7 +38,7 @@ def plain_matches(a: Features, b: Features, config: Matching) -> set[tuple[int, 
         found = {}
         for i, row in enumerate(angles):
             first, second = np.argsort(row, kind="stable")[:2]
-            if row[first] < config.max_ratio * row[second] and row[first] < config.max_angle_rad:
+            if row[first] < ratio * row[second] and row[first] < Matching().max_angle_rad:
                 found[i] = int(first)
         return found
 
@@ -50,9 +50,8 @@ def test_matches_are_those_of_the_plain_implementation() -> None:
     rng = np.random.default_rng(0)
     a = random_features(rng, 200)
     b = noisy_copy(rng, a, 120, 60)
-    config = Matching()
-    found = {(int(i), int(j)) for i, j in match_descriptors(a, b, config)}
-    assert found == plain_matches(a, b, config)
+    found = {(int(i), int(j)) for i, j in match_descriptors(a, b, 0.8, Matching())}
+    assert found == plain_matches(a, b, 0.8)
     assert len(found) > 50
 
 
@@ -60,20 +59,20 @@ def test_matching_is_symmetric() -> None:
     rng = np.random.default_rng(1)
     a = random_features(rng, 150)
     b = noisy_copy(rng, a, 80, 50)
-    forth, back = match_descriptors(a, b, Matching()), match_descriptors(b, a, Matching())
+    forth, back = match_descriptors(a, b, 0.8, Matching()), match_descriptors(b, a, 0.8, Matching())
     assert {tuple(m) for m in forth} == {tuple(m[::-1]) for m in back}
 
 
 def test_empty_photos_match_nothing() -> None:
     rng = np.random.default_rng(2)
     none = random_features(rng, 0)
-    assert match_descriptors(none, random_features(rng, 9), Matching()).shape == (0, 2)
+    assert match_descriptors(none, random_features(rng, 9), 0.8, Matching()).shape == (0, 2)
 
 
 def test_few_photos_are_matched_exhaustively() -> None:
     rng = np.random.default_rng(3)
     features = [random_features(rng, 5) for _ in range(6)]
-    assert choose_pairs(features, Matching()) == list(combinations(range(6), 2))
+    assert choose_pairs(features, 0.8, Matching()) == list(combinations(range(6), 2))
 
 
 def test_many_photos_are_matched_with_neighbours_and_look_alikes() -> None:
@@ -81,7 +80,7 @@ def test_many_photos_are_matched_with_neighbours_and_look_alikes() -> None:
     features = [random_features(rng, 30) for _ in range(12)]
     features[11] = noisy_copy(rng, features[0], 25, 5)  # the path closes its loop
     config = Matching(exhaustive_up_to=10, sequential_window=2, similar_photos=1)
-    pairs = choose_pairs(features, config)
+    pairs = choose_pairs(features, 0.8, config)
     assert (0, 11) in pairs
     assert all((i, i + 1) in pairs for i in range(11))
     assert len(pairs) < 30

@@ -7,9 +7,10 @@ import pytest
 import trimesh
 
 from garden_models.geometry.rigid import rigid
-from garden_models.rendering.hybrid import BACKGROUND_ID, NEUTRAL, render_scene
+from garden_models.rendering.config import NEUTRAL, RenderViews
+from garden_models.rendering.hybrid import BACKGROUND_ID, render_scene
 from garden_models.rendering.turntable import Turntable, look_at, turn_mesh, view_cloud
-from garden_models.rendering.views import RenderViews, chosen_views, render_views
+from garden_models.rendering.views import chosen_views, render_views
 from garden_models.scene import (
     Background,
     BadInput,

@@ -7,7 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from garden_models.rendering.splat import Splatting, splat_points
+from garden_models.rendering.config import Splatting
+from garden_models.rendering.splat import splat_points
 from garden_models.scene import PointCloud
 
 SIZE = (160, 120)
