@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from garden_models.disentanglement.fill import CleanBackground
+from garden_models.disentanglement.config import CleanBackground
 from garden_models.progress import Progress, silent
 from garden_models.scene import (
     Background,

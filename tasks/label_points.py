@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from garden_models.disentanglement.label import LabelPoints
+from garden_models.disentanglement.config import LabelPoints
 from garden_models.progress import Progress, silent
 from garden_models.scene import (
     GravityView,

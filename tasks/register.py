@@ -7,7 +7,7 @@ that it stays in the store. A foreign library that may hang: it runs in a child 
 from __future__ import annotations
 
 from garden_models.progress import Progress, silent
-from garden_models.reconstruction.registration import Registration
+from garden_models.reconstruction.registration_config import Registration
 from garden_models.scene import Capture, SparseModel
 from tasks.step import step, step_scratch
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from garden_models.progress import Progress, silent
 from garden_models.scene import GravityView, ObjectMasks, Reconstruction, Target
-from garden_models.segmentation.geometric import Segment
+from garden_models.segmentation.config import Segment
 from tasks.step import step
 
 

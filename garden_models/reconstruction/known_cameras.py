@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,19 +10,12 @@ import pycolmap
 from jaxtyping import Float
 
 from garden_models.geometry.rigid import homogeneous, invert_rigid
+from garden_models.reconstruction.registration_config import CameraTrust
 from garden_models.scene import KnownCamera, Photo, Verdict
 
 MAX_EPIPOLAR_SHARE = 0.004
 """Distance of a match from its epipolar line, over the photo's longer side, up to which it
 agrees with the given cameras (4 pixels of 1000, as much as the matches' own check allows)."""
-
-
-@dataclass(frozen=True)
-class CameraTrust:
-    """When given cameras count as right: share of verified matches that agree with them."""
-
-    failed_below: float = 0.2
-    degraded_below: float = 0.6
 
 
 def opencv_camera(known: KnownCamera, photo: Photo, camera_id: int) -> pycolmap.Camera:

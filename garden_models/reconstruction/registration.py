@@ -8,26 +8,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import pycolmap
 
 from garden_models.progress import Progress, silent
 from garden_models.reconstruction.known_cameras import (
-    CameraTrust,
     agreement,
     judge_agreement,
     opencv_camera,
     triangulate,
 )
+from garden_models.reconstruction.registration_config import Registration
 from garden_models.reconstruction.registration_database import first_guesses
 from garden_models.reconstruction.registration_evidence import photo_evidence, supported_models
-from garden_models.reconstruction.registration_mapping import LADDER, Rung, map_photos
+from garden_models.reconstruction.registration_mapping import map_photos
 from garden_models.reconstruction.registration_matches import PhotoMatcher
-from garden_models.reconstruction.registration_matching import Matching
 from garden_models.reconstruction.registration_verdict import (
-    Expectation,
     judge,
     judge_without_camera,
 )
@@ -44,21 +42,6 @@ WELL_CONNECTED = 50
 """Points shared with two other photos from which a photo needs no more matches."""
 
 GIVEN_SCALE = Scale("known_cameras", 1.0, "the unit of the given cameras is taken as metres")
-
-
-@dataclass(frozen=True)
-class Registration:
-    """How photos are registered."""
-
-    ladder: tuple[Rung, ...] = LADDER
-    matching: Matching = field(default_factory=Matching)
-    expectation: Expectation = field(default_factory=Expectation)
-    trust: CameraTrust = field(default_factory=CameraTrust)
-    camera_model: str = "SIMPLE_RADIAL"  # COLMAP's name; one radial coefficient
-    fewest_confirmed: int = 15  # points that a photo must share with two others
-    threads: int = 2  # for features and matches, whose results do not depend on them
-    mapper_threads: int = 1  # with more, COLMAP's last bits differ from run to run
-    seed: int = 0
 
 
 def register(

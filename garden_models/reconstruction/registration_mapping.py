@@ -2,49 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import pycolmap
 
-from garden_models.reconstruction.registration_matching import Look
+from garden_models.reconstruction.registration_config import Rung
 
 # COLMAP reports a rung that finds nothing as an error on standard error; the ladder's
 # attempts say it better.
 pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL.value
-
-
-@dataclass(frozen=True)
-class Rung:
-    """One setting of features and mapper; later rungs accept weaker evidence.
-
-    The first pair must have ``start_inliers`` matches and a triangulation angle of
-    ``start_angle_deg``, and may move forward at most ``start_forward`` (1 = straight
-    ahead); a further photo needs ``pose_inliers`` points that it sees again.
-    """
-
-    name: str
-    look: Look
-    mapper: Literal["incremental", "global"] = "incremental"
-    start_inliers: int = 100
-    start_angle_deg: float = 16.0
-    start_forward: float = 0.95
-    pose_inliers: int = 30
-
-
-FIRST_LOOK = Look(features=4096)
-SECOND_LOOK = Look(features=8192, affine=True, max_ratio=0.9, min_inlier_ratio=0.15)
-
-LADDER = (
-    Rung("4096 features", FIRST_LOOK),
-    Rung("4096 features, wide start", FIRST_LOOK, "incremental", 50, 4.0, 1.0, 15),
-    Rung("affine features", SECOND_LOOK),
-    Rung("affine features, wide start", SECOND_LOOK, "incremental", 50, 4.0, 1.0, 15),
-    Rung("affine features, global mapper", SECOND_LOOK, "global"),
-)
-"""A wide start costs a second with the matches at hand, another look a minute; so each look
-is tried with both."""
 
 
 def map_photos(

@@ -11,6 +11,7 @@ import pycolmap
 from jaxtyping import Int
 
 from garden_models.progress import Progress, silent
+from garden_models.reconstruction.registration_config import Look, Matching
 from garden_models.reconstruction.registration_database import verify_pairs, write_database
 from garden_models.reconstruction.registration_features import (
     Features,
@@ -18,8 +19,6 @@ from garden_models.reconstruction.registration_features import (
     detect_features,
 )
 from garden_models.reconstruction.registration_matching import (
-    Look,
-    Matching,
     Pair,
     choose_pairs,
     match_pairs,

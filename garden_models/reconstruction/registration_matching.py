@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -11,36 +10,10 @@ import torch
 from jaxtyping import Int
 
 from garden_models.progress import Progress, silent
+from garden_models.reconstruction.registration_config import Matching
 from garden_models.reconstruction.registration_features import DESCRIPTOR_UNIT, Features
 
 Pair = tuple[int, int]
-
-
-@dataclass(frozen=True)
-class Look:
-    """How closely photos are looked at.
-
-    ``features`` a photo, with affine shapes or without; ``max_ratio`` of the angles to the
-    best and the second best descriptor; ``min_inlier_ratio`` of a pair's matches must agree
-    with one geometry (0: their number alone counts).
-    """
-
-    features: int
-    affine: bool = False
-    max_ratio: float = 0.8
-    min_inlier_ratio: float = 0.0
-
-
-@dataclass(frozen=True)
-class Matching:
-    """How descriptors are matched and which pairs are tried."""
-
-    max_angle_rad: float = 0.7  # between matching descriptors
-    exhaustive_up_to: int = 60  # photos; beyond it pairs are chosen
-    sequential_window: int = 10  # following photos tried for each, beyond
-    similar_photos: int = 20  # most similar photos tried for each, beyond
-    similarity_features: int = 512  # largest features that tell similarity
-    second_look_partners: int = 15  # photos that a badly connected one is matched with again
 
 
 def choose_pairs(features: Sequence[Features], max_ratio: float, config: Matching) -> list[Pair]:

@@ -3,21 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
+from garden_models.reconstruction.registration_config import Expectation
 from garden_models.reconstruction.registration_matching import Pair
 from garden_models.scene import Verdict
 
 REMEDY = "take more photos between them and the others, each overlapping the next by half or more"
-
-
-@dataclass(frozen=True)
-class Expectation:
-    """What a registration must reach."""
-
-    fewest_photos: int = 3  # registered; fewer are no reconstruction
-    share_above: float = 0.5  # of the photos must be registered together, more than this
-    confirmed_points: int = 30  # that the median photo shares with two others, else degraded
 
 
 def judge(

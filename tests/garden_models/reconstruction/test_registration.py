@@ -6,14 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pycolmap
 import pytest
 
 from garden_models.geometry.camera import project
 from garden_models.geometry.rigid import homogeneous, transform_points
 from garden_models.metrics.camera_pose import camera_pose_errors
 from garden_models.reconstruction.registration import Registration, badly_connected, register
-from garden_models.reconstruction.registration_mapping import LADDER
-from garden_models.reconstruction.registration_matching import Look
+from garden_models.reconstruction.registration_config import LADDER, Look
 from garden_models.scene import BadInput, Capture, Photo, SparseModel
 
 from .textured_room import SIZE, noise_texture, room_capture
@@ -151,6 +151,4 @@ def test_photos_that_known_cameras_leave_out_are_named(room: Capture, tmp_path: 
 
 
 def test_nothing_placed_means_all_badly_connected() -> None:
-    import pycolmap
-
     assert badly_connected(pycolmap.Reconstruction(), 3) == [0, 1, 2]
