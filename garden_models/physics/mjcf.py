@@ -21,7 +21,7 @@ from garden_models.physics.prism import support_prisms
 from garden_models.scene import Body, SupportSurface
 
 ZUP_FROM_GV = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-"""Rotation from Gravity-View (y down) to a right-handed z-up frame (DESIGN, section 4)."""
+"""Rotation from Gravity-View (y down) to a right-handed z-up frame."""
 
 SUPPORT_FRICTION = 0.3
 """Sliding friction of supports. MuJoCo takes the larger of two, so the body's own decides."""

@@ -151,16 +151,16 @@ def test_a_rerun_executes_nothing(run: Run) -> None:
     assert {step["outcome"] for step in again.report["steps"]} == {"cached"}
 
 
-def test_another_box_reruns_only_that_target_and_what_joins_the_targets(run: Run) -> None:
+def test_another_box_reruns_no_reconstruction(run: Run) -> None:
+    """The others may rerun too: boxes in different photos may claim the same points."""
     document = json.loads((run.folder / "corner" / "targets.json").read_text())
     jar = next(t for t in document["targets"] if t["name"] == "jar")
     jar["box"] = [jar["box"][0] + 2, jar["box"][1] + 2, jar["box"][2] - 2, jar["box"][3] - 2]
     changed = run.folder / "changed.json"
     changed.write_text(json.dumps(document))
     again = run.again("--targets", str(changed))
-    assert {step for step, target in again.executed if target} <= OBJECT_STEPS
-    assert {target for _, target in again.executed if target} == {"jar"}
-    assert {step for step, target in again.executed if not target} <= SCENE_STEPS
+    assert ("segment", "jar") in again.executed
+    assert {step for step, _ in again.executed} <= OBJECT_STEPS | SCENE_STEPS
 
 
 def test_the_store_is_sound_and_explains_itself(
