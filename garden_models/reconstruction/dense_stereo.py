@@ -19,16 +19,16 @@ class DenseStereo:
     """Share by which the depth range of the sparse points is widened, nearer and farther."""
     max_planes: int = 160
     """Most inverse depths that the coarse sweep tries."""
-    small_step: float = 0.03
-    large_step: float = 0.3
-    edge_scale: float = 0.05
+    small_step: float = 0.06
+    large_step: float = 0.6
+    edge_scale: float = 0.03
     """Semi-global matching on the coarse sweep: see ``semi_global``."""
     max_relative: float = 0.01
     max_disagreement_px: float = 1.0
     """Two photos agree on a spot where their depths differ by less than both."""
     min_agreeing: int = 2
     """Other photos that must agree for a depth to be kept."""
-    max_cost: float = 0.7
+    max_cost: float = 0.8
     """Matching cost (1 - correlation) from which on a depth has no say."""
     max_points: int = 500_000
     """Most points of the fused cloud."""

@@ -15,6 +15,7 @@ from garden_models.reconstruction.dense_stereo import DenseStereo
 from garden_models.reconstruction.depth_completion import complete
 from garden_models.reconstruction.depth_consistency import DepthView, agreement
 from garden_models.reconstruction.depth_filter import filter_depth
+from garden_models.reconstruction.depth_interpolation import bridge_gaps
 from garden_models.reconstruction.fusion import (
     FusedView,
     footprints,
@@ -29,8 +30,8 @@ from garden_models.reconstruction.multiview_stereo import (
     half_rematch,
     sweep_view,
 )
-from garden_models.reconstruction.patch_cost import Planes
 from garden_models.reconstruction.photo_pool import RunForPhotos, photo_pool
+from garden_models.reconstruction.planes import Planes
 from garden_models.reconstruction.stereo_frame import StereoFrame, stereo_frame
 from garden_models.reconstruction.stereo_plan import StereoPlan, plan_stereo
 from garden_models.reconstruction.undistort import WorkingView, working_views
@@ -64,7 +65,7 @@ def densify(
     with photo_pool(torch.device(config.device)) as run:
         matches, frames = _match(plan, config, run, progress)
         depths = _confirm(plan, frames, matches, config, run, progress)
-        depths = _complete(plan, depths, config, run, progress)
+        depths = _fill_gaps(plan, depths, matches, config, run, progress)
         cloud = _fuse(plan, depths, config, run, progress)
     progress(1.0, f"{len(cloud)} points")
     return Reconstruction(
@@ -183,19 +184,23 @@ def _confirm(
     return run(confirm, plan.matchable, lambda done: progress(0.86, "comparing depths"))
 
 
-def _complete(
+def _fill_gaps(
     plan: StereoPlan,
     depths: dict[int, DepthView],
+    matches: dict[int, ViewMatch],
     config: DenseStereo,
     run: RunForPhotos,
     progress: Progress,
 ) -> dict[int, DepthView]:
-    """Fill gaps of each photo with what the others confirmed."""
+    """Fill gaps of each photo with what the others confirmed, then what its own surroundings
+    carry on.
+    """
     small = _frames(plan, 2, config)
 
-    def fill(i: int) -> DepthView:
+    def from_others(i: int) -> DepthView:
         planes, trust = complete(
             depths[i],
+            matches[i].matched.cost,
             plan.views[i].rgb,
             small[i],
             [(depths[j], plan.views[j].rgb, small[j]) for j in plan.related(i)],
@@ -204,7 +209,21 @@ def _complete(
         )
         return DepthView(depths[i].frame, planes, trust)
 
-    return run(fill, plan.matchable, lambda done: progress(0.89, "filling gaps"))
+    def from_surroundings(i: int) -> DepthView:
+        return bridge_gaps(
+            completed[i],
+            matches[i],
+            small[i],
+            [small[j] for j in plan.partners[i]],
+            [completed[j] for j in plan.related(i)],
+            config.max_relative,
+            config.max_disagreement_px,
+        )
+
+    completed = run(
+        from_others, plan.matchable, lambda done: progress(0.88, "filling gaps from other photos")
+    )
+    return run(from_surroundings, plan.matchable, lambda done: progress(0.9, "bridging bare gaps"))
 
 
 def _fuse(
@@ -215,7 +234,9 @@ def _fuse(
     progress: Progress,
 ) -> PointCloud:
     fused = {i: FusedView(depths[i], plan.views[i].rgb) for i in depths}
-    sizes = {i: footprints(depths[i].planes, depths[i].frame) for i in depths}
+    sizes = run(
+        lambda i: footprints(depths[i].planes, depths[i].frame), plan.matchable, lambda done: None
+    )
 
     def points(i: int) -> PointCloud:
         others = [(fused[j], sizes[j], j < i) for j in plan.related(i)]

@@ -1,8 +1,11 @@
 """Fill depths that a photo could not match itself from photos that could.
 
 Shiny or bare parts often match from some sides only. A surface that other photos confirmed
-among themselves is carried over where this photo has none, if at least two of them put the same
-surface there, none looks through it, and the colours are alike. Such depths get less confidence.
+among themselves is carried over where this photo has none, if enough of them put the same
+surface there, none looks through it, and the colours are alike. Two are enough where the photo's
+own, unconfirmed match is near; three where it failed to match. Where it matched something else
+well, that may be an object the others do not see, and the gap stays. Such depths get less
+confidence.
 """
 
 from __future__ import annotations
@@ -12,31 +15,23 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
-from garden_models.reconstruction.depth_consistency import DepthView, see_from
+from garden_models.reconstruction.depth_consistency import DepthView, at_level, see_from
 from garden_models.reconstruction.depth_transfer import carry_planes
-from garden_models.reconstruction.patch_cost import Planes
-from garden_models.reconstruction.patchmatch import chosen
-from garden_models.reconstruction.plane_fit import resize_planes
+from garden_models.reconstruction.planes import Planes, chosen
 from garden_models.reconstruction.stereo_frame import StereoFrame, homogeneous_pixels
 
 MAX_COLOUR_DIFFERENCE = 30.0  # mean over r, g, b of 0..255 against the mean of the sources
-MIN_SOURCES = 2
+NEAR = 0.03  # relative difference in depth from the photo's own match
+UNMATCHED_COST = 0.5  # own cost from which on the photo has no opinion
+MIN_SOURCES_NEAR = 2
+MIN_SOURCES_UNMATCHED = 3
 COMPLETED_CONFIDENCE = 0.5  # of that of the depths it comes from
-
-
-def at_level(view: DepthView, frame: StereoFrame) -> DepthView:
-    """Return a view's planes and trust at the size of another level's frame."""
-    height, width = frame.shape
-    rows, columns = view.frame.shape
-    device = view.trust.device
-    y = ((torch.arange(height, device=device) + 0.5) * (rows / height)).long()
-    x = ((torch.arange(width, device=device) + 0.5) * (columns / width)).long()
-    return DepthView(frame, resize_planes(view.planes, frame.shape), view.trust[y][:, x])
 
 
 @torch.no_grad()
 def complete(
     target: DepthView,
+    target_cost: Float[Tensor, "h w"],
     target_rgb: UInt8[np.ndarray, "h w 3"],
     target_small: StereoFrame,
     sources: list[tuple[DepthView, UInt8[np.ndarray, "h w 3"], StereoFrame]],
@@ -46,8 +41,9 @@ def complete(
     """Return the target's planes with gaps filled, and its trust: unchanged where it had
     any, between 0 and ``COMPLETED_CONFIDENCE`` where a gap was filled, else 0.
 
+    ``target_cost`` is the matching cost of the target's own planes, confirmed or not.
     ``sources`` are (view, photo, small frame); the surface is carried over at the size of the
-    small frames (its detail is checked at full size).
+    small frames and checked at full size.
     """
     smaller = [at_level(view, small) for view, _, small in sources]
     carried, carried_trust = carry_planes(target_small, smaller)
@@ -57,7 +53,14 @@ def complete(
     if len(index) == 0:
         return target.planes, target.trust
     trust, w = _confirmed(
-        target, target_rgb, offered.planes, index, sources, max_relative, max_pixels
+        target,
+        target_cost,
+        target_rgb,
+        offered.planes,
+        index,
+        sources,
+        max_relative,
+        max_pixels,
     )
     filled = torch.zeros_like(target.trust).reshape(-1)
     filled[index] = trust
@@ -70,6 +73,7 @@ def complete(
 
 def _confirmed(
     target: DepthView,
+    target_cost: Float[Tensor, "h w"],
     target_rgb: UInt8[np.ndarray, "h w 3"],
     planes: Planes,
     index: Tensor,
@@ -95,5 +99,8 @@ def _confirmed(
         through += seen.through
     own = torch.from_numpy(target_rgb.reshape(-1, 3)).to(w.device)[index].T.float()
     alike = (colour / weight - own).abs().mean(dim=0) < MAX_COLOUR_DIFFERENCE
-    accepted = (count >= MIN_SOURCES) & (through == 0) & alike
+    near = (w / target.planes.at(index).w - 1).abs() < NEAR
+    unmatched = target_cost.reshape(-1)[index] > UNMATCHED_COST
+    enough = (near & (count >= MIN_SOURCES_NEAR)) | (unmatched & (count >= MIN_SOURCES_UNMATCHED))
+    accepted = enough & (through == 0) & alike
     return COMPLETED_CONFIDENCE * weight / count.clamp(min=1) * accepted, total / weight

@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from garden_models.reconstruction.patch_cost import Planes
+from garden_models.reconstruction.planes import Planes, resize_planes
 from garden_models.reconstruction.stereo_frame import (
     StereoFrame,
     homogeneous_pixels,
@@ -24,6 +24,16 @@ class DepthView:
     frame: StereoFrame
     planes: Planes
     trust: Float[Tensor, "h w"]
+
+
+def at_level(view: DepthView, frame: StereoFrame) -> DepthView:
+    """Return a view's planes and trust at the size of another level's frame."""
+    height, width = frame.shape
+    rows, columns = view.frame.shape
+    device = view.trust.device
+    y = ((torch.arange(height, device=device) + 0.5) * (rows / height)).long()
+    x = ((torch.arange(width, device=device) + 0.5) * (columns / width)).long()
+    return DepthView(frame, resize_planes(view.planes, frame.shape), view.trust[y][:, x])
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from garden_models.reconstruction.depth_consistency import Agreement
-from garden_models.reconstruction.patch_cost import Planes
-from garden_models.reconstruction.patchmatch import shifted
+from garden_models.reconstruction.planes import Planes, shifted
 
 MIN_SUPPORT = 4  # of 8 neighbours that must lie on the pixel's own plane
 MIN_ISLAND_SHARE = 2e-4  # of the photo's pixels; smaller islands of depth are dropped

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from garden_models.reconstruction.depth_consistency import DepthView
-from garden_models.reconstruction.patch_cost import Planes
+from garden_models.reconstruction.planes import Planes
 from garden_models.reconstruction.stereo_frame import (
     StereoFrame,
     homogeneous_pixels,

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from garden_models.geometry.rigid import invert_rigid, transform_points
 from garden_models.reconstruction.depth_consistency import DepthView, each_seen
-from garden_models.reconstruction.patch_cost import Planes
+from garden_models.reconstruction.planes import Planes
 from garden_models.reconstruction.stereo_frame import StereoFrame, homogeneous_pixels
 from garden_models.scene import PointCloud
 

@@ -19,27 +19,27 @@ from garden_models.reconstruction.dense_stereo import DenseStereo
 from garden_models.reconstruction.depth_consistency import DepthView
 from garden_models.reconstruction.depth_transfer import carry_planes
 from garden_models.reconstruction.partner_atlas import PartnerAtlas, partner_atlas
-from garden_models.reconstruction.patch_cost import PatchCost, PatchShape, Planes
+from garden_models.reconstruction.patch_cost import PatchCost, PatchShape
 from garden_models.reconstruction.patchmatch import (
     Matched,
     attempt,
     choose_views,
-    chosen,
     propagate,
     refine_value,
     start,
     vary,
 )
-from garden_models.reconstruction.plane_fit import fit_planes, resize_planes, surface_planes
-from garden_models.reconstruction.plane_smoothing import average_out_noise, follow_surroundings
+from garden_models.reconstruction.plane_fit import fit_planes, surface_planes
+from garden_models.reconstruction.plane_smoothing import average_out_noise
 from garden_models.reconstruction.plane_sweep import sweep_planes
+from garden_models.reconstruction.planes import Planes, chosen, resize_planes
 from garden_models.reconstruction.semi_global import semi_global
 from garden_models.reconstruction.stereo_frame import StereoFrame, parallax_per_inverse_depth
 
 COARSE_PATCH = PatchShape(radius=2, stride=1)
-HALF_PATCH = PatchShape(radius=4, stride=2)
+HALF_PATCH = PatchShape(radius=2, stride=1)
 FULL_PATCH = PatchShape(radius=4, stride=2)
-SWEEP_RADIUS = 2
+SWEEP_RADIUS = 1
 REFINE_NOISE = 0.08  # see refine_value
 
 
@@ -85,7 +85,7 @@ def sweep_view(
     w = lowest_label(smooth, inverse_depths)
     tolerance = torch.full_like(w, float(inverse_depths[1] - inverse_depths[0]))
     even = torch.ones_like(w)
-    return fit_planes(surface_planes(w), frame.grey, even, tolerance, 0.1, rounds=2)[0]
+    return fit_planes(surface_planes(w), frame.grey, even, tolerance, 0.1, rounds=2)
 
 
 def lowest_label(
@@ -130,14 +130,13 @@ def half_match(
 ) -> ViewMatch:
     """Match every pixel at half size, starting from the coarse planes."""
     planes = resize_planes(previous.matched.planes, frame.shape)
-    views = _resized_views(previous.views, frame.shape)
+    views = resized_views(previous.views, frame.shape)
     atlas = partner_atlas(frame, partners, partner_w)
-    patch_cost = _cost(frame, atlas, HALF_PATCH, views)
+    patch_cost = views_cost(frame, atlas, HALF_PATCH, views)
     step = 1 / parallax_per_inverse_depth(frame, partners, planes.w)
     matched = start(planes, patch_cost)
     matched = propagate(matched, patch_cost, limits)
     matched = vary(matched, patch_cost, limits, step, 0.2 * step, generator)
-    matched = follow_surroundings(matched, patch_cost, frame.grey, step, limits)
     return ViewMatch(matched, views, step)
 
 
@@ -153,13 +152,12 @@ def half_rematch(
     offer and to be held against.
     """
     atlas = partner_atlas(frame, partners, [view.planes.w for view in partner_views])
-    patch_cost = _cost(frame, atlas, HALF_PATCH, previous.views)
+    patch_cost = views_cost(frame, atlas, HALF_PATCH, previous.views)
     matched = start(previous.matched.planes, patch_cost)
     carried, trust = carry_planes(frame, partner_views)
     offered = chosen(trust > 0, carried, matched.planes)
     matched = attempt(matched, offered, patch_cost, limits)
     matched = propagate(matched, patch_cost, limits)
-    matched = follow_surroundings(matched, patch_cost, frame.grey, previous.step, limits)
     return ViewMatch(matched, previous.views, previous.step)
 
 
@@ -172,28 +170,29 @@ def full_match(
 ) -> ViewMatch:
     """Sharpen depth jumps and refine every depth at full size, by the photos alone."""
     planes = resize_planes(previous.matched.planes, frame.shape)
-    views = _resized_views(previous.views, frame.shape)
+    views = resized_views(previous.views, frame.shape)
     atlas = partner_atlas(frame, partners, None)
-    everywhere = _cost(frame, atlas, FULL_PATCH, views)
+    everywhere = views_cost(frame, atlas, FULL_PATCH, views)
     step = 1 / parallax_per_inverse_depth(frame, partners, planes.w)
     matched = start(planes, everywhere)
-    jumps = near_jumps(planes, 2 * step, radius=3)
+    jumps = near_jumps(planes, step, radius=4)
     index = torch.nonzero(jumps.reshape(-1))[:, 0]
     if len(index):
-        there = _cost(frame, atlas, FULL_PATCH, views, index)
+        there = views_cost(frame, atlas, FULL_PATCH, views, index)
         matched = propagate(matched, there, limits)
     matched = refine_value(matched, everywhere, 0.5 * step, REFINE_NOISE)
     matched = average_out_noise(matched, frame.grey, step)
     return ViewMatch(matched, views, step)
 
 
-def _cost(
+def views_cost(
     frame: StereoFrame,
     atlas: PartnerAtlas,
     shape: PatchShape,
     views: Int[Tensor, "slots h w"],
     index: Int[Tensor, " n"] | None = None,
 ) -> PatchCost:
+    """Return the patch cost with each pixel's own partners, at all or the indexed pixels."""
     flat = views.reshape(len(views), -1)
     chosen_views = flat if index is None else flat[:, index]
     return PatchCost(frame, atlas, shape, len(views), index=index, views=chosen_views)
@@ -212,7 +211,8 @@ def near_jumps(planes: Planes, step: Float[Tensor, "h w"], radius: int) -> Bool[
     return F.max_pool2d(jump[None, None], size, 1, radius)[0, 0] > 0
 
 
-def _resized_views(
+def resized_views(
     views: Int[Tensor, "slots h w"], shape: tuple[int, int]
 ) -> Int[Tensor, "slots h2 w2"]:
+    """Return the chosen partners at another level's size."""
     return F.interpolate(views[None].float(), shape, mode="nearest")[0].long()

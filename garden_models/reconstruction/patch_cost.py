@@ -18,32 +18,14 @@ from torch import Tensor
 
 from garden_models.reconstruction.partner_atlas import PartnerAtlas, map_lookup
 from garden_models.reconstruction.plane_sweep import NOISE_VARIANCE
+from garden_models.reconstruction.planes import Planes
 from garden_models.reconstruction.stereo_frame import StereoFrame, homogeneous_pixels
 
 PIXELS_AT_ONCE = 8192  # a chunk's samples stay in the processor's cache
 GEOMETRIC_LIMIT_PX = 2.0
 GEOMETRIC_WEIGHT = 0.1  # cost per pixel of disagreement with a partner's depth
-UNSEEN_COST = 1.0 + GEOMETRIC_LIMIT_PX * GEOMETRIC_WEIGHT
-
-
-@dataclass(frozen=True)
-class Planes:
-    """A plane in inverse depth per pixel: value at the pixel and slopes per pixel.
-
-    Either whole images or vectors over chosen pixels.
-    """
-
-    w: Float[Tensor, "*s"]
-    gx: Float[Tensor, "*s"]
-    gy: Float[Tensor, "*s"]
-
-    def at(self, index: Int[Tensor, " n"]) -> Planes:
-        """Return the planes of the pixels with these flat indices, as vectors."""
-        return Planes(*(field.reshape(-1)[index] for field in (self.w, self.gx, self.gy)))
-
-    def flat(self) -> Planes:
-        """Return the planes of all pixels as vectors."""
-        return Planes(self.w.reshape(-1), self.gx.reshape(-1), self.gy.reshape(-1))
+UNSEEN_COST = 1.0 + GEOMETRIC_LIMIT_PX * GEOMETRIC_WEIGHT + 1e-3
+HIDDEN_PENALTY = 0.1  # added cost, times the share of a pixel's views that do not see it
 
 
 @dataclass(frozen=True)
@@ -54,7 +36,7 @@ class PatchShape:
 
     radius: int
     stride: int
-    colour_sigma: float = 0.15
+    colour_sigma: float = 0.03
 
     def offsets(self, device: torch.device) -> Float[Tensor, "taps 2"]:
         """Return the (x, y) offsets of the taps."""
@@ -165,11 +147,19 @@ class PatchCost:
         return out
 
     def __call__(self, planes: Planes) -> Float[Tensor, " n"]:
-        """Return the costs (0..1.2) of vectors of planes: mean over the best views."""
+        """Return the costs (0..1.2) of vectors of planes.
+
+        They are means over the best views; those that do not see the spot do not count, but
+        each of them raises the cost a little, lest planes hide from the photos.
+        """
         costs = self.per_view(planes)
         if self.best < len(costs):
             costs = costs.topk(self.best, dim=0, largest=False).values
-        return costs.mean(dim=0)
+        hidden = costs >= UNSEEN_COST
+        unseen = hidden.sum(dim=0)
+        mean = costs.masked_fill(hidden, 0.0).sum(dim=0) / (len(costs) - unseen).clamp(min=1)
+        mean += HIDDEN_PENALTY * unseen / len(costs)
+        return torch.where(unseen < len(costs), mean, UNSEEN_COST)
 
     def _slot(self, which: Int[Tensor, " n_or_1"]) -> _Slot:
         atlas = self.atlas

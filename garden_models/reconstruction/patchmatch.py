@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import torch
 import torch.nn.functional as F
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from torch import Tensor
 
-from garden_models.reconstruction.patch_cost import PatchCost, Planes
+from garden_models.reconstruction.patch_cost import PatchCost
+from garden_models.reconstruction.planes import Planes, chosen, shifted
 
 DIRECTIONS: tuple[tuple[tuple[int, int], ...], ...] = (
     ((-1, 0), (-3, 0), (-5, -1), (-5, 1)),
@@ -30,14 +31,6 @@ class Matched:
 
     planes: Planes
     cost: Float[Tensor, "h w"]
-
-
-def shifted(image: Float[Tensor, "h w"], dx: int, dy: int) -> Float[Tensor, "h w"]:
-    """Return ``out[y, x] = image[y + dy, x + dx]``, the border repeated."""
-    height, width = image.shape
-    reach = max(abs(dx), abs(dy))
-    padded = F.pad(image[None, None], (reach,) * 4, mode="replicate")[0, 0]
-    return padded[reach + dy : reach + dy + height, reach + dx : reach + dx + width]
 
 
 def neighbour_planes(matched: Matched, direction: tuple[tuple[int, int], ...]) -> Planes:
@@ -57,15 +50,6 @@ def neighbour_planes(matched: Matched, direction: tuple[tuple[int, int], ...]) -
         gx = torch.where(better, their_gx, gx)
         gy = torch.where(better, their_gy, gy)
     return Planes(w, gx, gy)
-
-
-def chosen(where: Bool[Tensor, "h w"], these: Planes, those: Planes) -> Planes:
-    """Return ``these`` planes where told, else ``those``."""
-    return Planes(
-        torch.where(where, these.w, those.w),
-        torch.where(where, these.gx, those.gx),
-        torch.where(where, these.gy, those.gy),
-    )
 
 
 def start(planes: Planes, patch_cost: PatchCost) -> Matched:

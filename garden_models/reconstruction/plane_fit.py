@@ -7,8 +7,7 @@ import torch.nn.functional as F
 from jaxtyping import Float
 from torch import Tensor
 
-from garden_models.reconstruction.patch_cost import Planes
-from garden_models.reconstruction.patchmatch import shifted
+from garden_models.reconstruction.planes import Planes, shifted
 
 
 def start_slopes(w: Float[Tensor, "h w"]) -> tuple[Tensor, Tensor]:
@@ -30,19 +29,34 @@ def fit_planes(
     colour_sigma: float,
     spread: int = 1,
     rounds: int = 1,
-) -> tuple[Planes, Float[Tensor, "h w"]]:
-    """Return, per pixel, the plane through the inverse depths of 5x5 pixels around it, and
-    how much evidence it rests on (sum of weights).
+) -> Planes:
+    """Return, per pixel, the plane through the inverse depths of 5x5 pixels around it.
 
     The 25 pixels are ``spread`` apart. They count by ``weight`` (their own trust), by
     likeness of grey (``colour_sigma``) and by their distance from the current plane in units
     of ``tolerance`` (inverse depth), so that another surface does not bend the plane.
     """
-    evidence = weight
     for _ in range(rounds):
         sums = _moments(planes, grey, weight, tolerance, colour_sigma, spread)
-        planes, evidence = _solve(sums, planes), sums[0]
-    return planes, evidence
+        planes = _solve(sums, planes)
+    return planes
+
+
+def plane_support(
+    planes: Planes,
+    grey: Float[Tensor, "h w"],
+    weight: Float[Tensor, "h w"],
+    tolerance: Float[Tensor, "h w"],
+    colour_sigma: float,
+    spread: int,
+) -> tuple[Planes, Float[Tensor, "h w"], Float[Tensor, "h w"]]:
+    """Fit once like ``fit_planes``; return also the sum of weights, and how far from the
+    pixel the centre of what supports its plane lies.
+    """
+    sums = _moments(planes, grey, weight, tolerance, colour_sigma, spread)
+    total = sums[0].clamp(min=1e-9)
+    offset = torch.hypot(sums[1] / total, sums[2] / total)
+    return _solve(sums, planes), sums[0], offset
 
 
 def _moments(
@@ -99,23 +113,3 @@ def surface_planes(w: Float[Tensor, "h w"]) -> Planes:
     """Return planes through single inverse depths with one-sided slopes."""
     gx, gy = start_slopes(w)
     return Planes(w, gx, gy)
-
-
-def resize_planes(planes: Planes, size: tuple[int, int]) -> Planes:
-    """Carry planes to another resolution (height, width): each new pixel takes its nearest
-    old pixel's plane, evaluated where the new pixel is.
-    """
-    height, width = size
-    old_height, old_width = planes.w.shape
-    device = planes.w.device
-    y = (torch.arange(height, device=device) + 0.5) * (old_height / height)
-    x = (torch.arange(width, device=device) + 0.5) * (old_width / width)
-    row, column = y.long().clamp(max=old_height - 1), x.long().clamp(max=old_width - 1)
-    dy, dx = (y - row - 0.5)[:, None], (x - column - 0.5)[None, :]
-
-    def pick(field: Tensor) -> Tensor:
-        return field[row][:, column]
-
-    gx, gy = pick(planes.gx), pick(planes.gy)
-    w = pick(planes.w) + gx * dx + gy * dy
-    return Planes(w, gx * (old_width / width), gy * (old_height / height))

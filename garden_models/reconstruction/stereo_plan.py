@@ -43,7 +43,7 @@ def plan_stereo(
     Raises BadGeometry if no two photos share enough of them.
     """
     seen = visibility(sparse)
-    chosen = select_views(sparse, config.partners)
+    chosen = select_views(views, sparse, config.partners)
     limits = {}
     for i, view in enumerate(views):
         reach = inverse_depth_range(view, sparse.points_world, seen[i], config.range_margin)

@@ -1,8 +1,9 @@
 """Choose, for each photo, the photos to match it with and the depths to look at.
 
 Both come from the sparse points: a good partner shares many of them under a triangulation
-angle that is wide enough to measure depth and narrow enough to look alike (the score of
-Goesele et al. 2007 and COLMAP, with points counted until enough partners see them).
+angle that is wide enough to measure depth (whose information grows with the angle squared)
+and narrow enough to look alike. Points count until enough partners see them. Where features
+matched too rarely to tell, points that merely fall inside both photos count a little.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ from garden_models.reconstruction.undistort import WorkingView
 from garden_models.scene import SparseModel
 
 BEST_ANGLE_DEG = 8.0
-SIGMA_BELOW_DEG = 4.0
 SIGMA_ABOVE_DEG = 10.0
+MAX_ANGLE_DEG = 45.0  # beyond it patches no longer look alike
+UNMATCHED_WORTH = 0.1  # of a matched point, for one that only falls inside both photos
 ENOUGH_PARTNERS = 2.0  # a point seen well by this many chosen partners counts no more
 MIN_SHARED_POINTS = 8
 
@@ -31,8 +33,9 @@ def visibility(sparse: SparseModel) -> Bool[np.ndarray, "cameras points"]:
 
 def angle_weight(angle_deg: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     """Return how useful a triangulation angle is for matching (1 at the best angle)."""
-    sigma = np.where(angle_deg < BEST_ANGLE_DEG, SIGMA_BELOW_DEG, SIGMA_ABOVE_DEG)
-    return np.exp(-0.5 * ((angle_deg - BEST_ANGLE_DEG) / sigma) ** 2)
+    information = np.minimum(angle_deg / BEST_ANGLE_DEG, 1.0) ** 2
+    excess = np.maximum(angle_deg - BEST_ANGLE_DEG, 0.0) / SIGMA_ABOVE_DEG
+    return np.where(angle_deg < MAX_ANGLE_DEG, information * np.exp(-0.5 * excess**2), 0.0)
 
 
 def pair_weights(
@@ -40,21 +43,27 @@ def pair_weights(
     centres_world: Float[np.ndarray, "cameras 3"],
     points_world: Float[np.ndarray, "points 3"],
     seen: Bool[np.ndarray, "cameras points"],
+    framed: Bool[np.ndarray, "cameras points"],
 ) -> Float[np.ndarray, "cameras points"]:
-    """Return, for each other camera and point, the point's worth to that pairing."""
+    """Return, for each other camera and point, the point's worth to that pairing.
+
+    ``seen`` tells which photos hold an observation of a point, ``framed`` in which it falls
+    inside the picture. Photos with too few points in common are worth nothing.
+    """
     weights = np.zeros(seen.shape)
     rays = points_world - centres_world[reference]
     length = np.linalg.norm(rays, axis=1)
     for other in range(len(centres_world)):
-        shared = np.flatnonzero(seen[reference] & seen[other])
-        if other == reference or len(shared) < MIN_SHARED_POINTS:
+        both = np.flatnonzero(seen[reference] & framed[other])
+        if other == reference or len(both) < MIN_SHARED_POINTS:
             continue
-        other_rays = points_world[shared] - centres_world[other]
+        other_rays = points_world[both] - centres_world[other]
         other_length = np.linalg.norm(other_rays, axis=1)
-        cosine = np.einsum("nc,nc->n", rays[shared], other_rays) / (length[shared] * other_length)
+        cosine = np.einsum("nc,nc->n", rays[both], other_rays) / (length[both] * other_length)
         angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-        ratio = np.minimum(length[shared] / other_length, other_length / length[shared])
-        weights[other, shared] = angle_weight(angle) * ratio
+        ratio = np.minimum(length[both] / other_length, other_length / length[both])
+        worth = np.where(seen[other, both], 1.0, UNMATCHED_WORTH)
+        weights[other, both] = angle_weight(angle) * ratio * worth
     return weights
 
 
@@ -76,13 +85,21 @@ def choose_partners(weights: Float[np.ndarray, "cameras points"], count: int) ->
     return tuple(chosen)
 
 
-def select_views(sparse: SparseModel, count: int) -> tuple[tuple[int, ...], ...]:
-    """Return the partners of every camera of ``sparse``, best first (none: empty)."""
+def select_views(
+    views: tuple[WorkingView, ...], sparse: SparseModel, count: int
+) -> tuple[tuple[int, ...], ...]:
+    """Return the partners of every view (in the order of ``sparse.cameras``), best first
+    (none: empty).
+    """
     seen = visibility(sparse)
-    centres = np.array([camera_centre(camera.camera_from_world) for camera in sparse.cameras])
+    centres = np.array([camera_centre(view.camera_from_world) for view in views])
+    framed = np.zeros_like(seen)
+    for i, view in enumerate(views):
+        pixels, _ = project(sparse.points_world, view.K, view.camera_from_world)
+        framed[i] = inside_image(pixels, view.size)
     return tuple(
-        choose_partners(pair_weights(reference, centres, sparse.points_world, seen), count)
-        for reference in range(len(sparse.cameras))
+        choose_partners(pair_weights(i, centres, sparse.points_world, seen, framed), count)
+        for i in range(len(views))
     )
 
 
