@@ -107,10 +107,9 @@ def _judged(
     xyz, spacing = graph.cloud.xyz, graph.cloud.spacing
     for _ in range(2):
         below = plane.residual(xyz)
-        found = _central_part(graph, evidence, evidence.inside & (below < -band))
-        if found is None:
+        core = _central_part(graph, evidence, evidence.inside & (below < -band))
+        if not core.any():
             return None
-        core = found
         foot = core & (below > FOOT_SHARE * below[core].min() - 2 * band)
         standing = xyz[foot if foot.any() else core][:, [0, 2]]
         size = float(np.linalg.norm(np.ptp(xyz[core][:, [0, 2]], axis=0)))
@@ -153,9 +152,8 @@ def _height_field(
     soil = rooted[parts]
 
     size = float(np.linalg.norm(np.ptp(xyz[core][:, [0, 2]], axis=0)))
-    grid = Grid.around(
-        xyz[:, [0, 2]], max(size / 40, float(np.median(graph.cloud.spacing))), 1, 256
-    )
+    cell = max(size / 40, float(np.median(graph.cloud.spacing)))
+    grid = Grid.around(xyz[:, [0, 2]], cell, margin=1, max_cells=256)
     row, column, _ = grid.cells_of(xyz[:, [0, 2]])
     flat = row * grid.shape[1] + column
     cells = grid.shape[0] * grid.shape[1]
@@ -172,13 +170,11 @@ def _height_field(
 
 def _central_part(
     graph: NodeGraph, evidence: BoxEvidence, above: Bool[np.ndarray, " n"]
-) -> Bool[np.ndarray, " n"] | None:
+) -> Bool[np.ndarray, " n"]:
     """Return the connected part of the nodes above that holds most of the box's middle."""
     parts = graph.components(above)
-    if parts.max(initial=-1) < 0:
-        return None
-    share = np.bincount(parts[above], evidence.central[above])
-    return parts == int(share.argmax()) if share.max() > 0 else None
+    share = np.bincount(parts[above], evidence.central[above], 1)
+    return above & (parts == int(share.argmax()) if share.max() > 0 else np.zeros_like(above))
 
 
 def _score(

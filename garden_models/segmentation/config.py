@@ -22,7 +22,7 @@ class Segment:
     """Points further apart than this many spacings are not joined."""
     colour_sigma: float = 20.0
     """CIE Lab difference over which two neighbours cease to be one thing."""
-    crease_deg: float = 25.0
+    crease_deg: float = 15.0
     """Bend of a concave crease over which two neighbours cease to be one thing."""
     max_tilt_deg: float = 8.0
     """How far a local support may lean: a cushion, a book, the error of gravity."""

@@ -4,23 +4,36 @@ all views, refined in the image, and voted back until points and pixels agree.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
+from jaxtyping import Bool, Float, Float32
 from scipy.spatial import cKDTree
 
 from garden_models.geometry.rigid import homogeneous, invert_rigid, transform_points
 from garden_models.progress import Progress, silent
-from garden_models.scene import GravityView, ObjectMasks, PointCloud, Reconstruction, Target
-from garden_models.segmentation.box import box_in_view
+from garden_models.scene import (
+    GravityView,
+    ObjectMasks,
+    PointCloud,
+    Reconstruction,
+    Target,
+    View,
+)
 from garden_models.segmentation.carrier import Carrier, find_carrier
 from garden_models.segmentation.config import Segment
 from garden_models.segmentation.hull import VisualHull, carve
 from garden_models.segmentation.node_graph import NodeGraph, node_graph
-from garden_models.segmentation.node_labels import Candidate, Probabilities, Votes, label_nodes
+from garden_models.segmentation.node_labels import (
+    Candidate,
+    Probabilities,
+    Votes,
+    label_nodes,
+    nearness,
+)
 from garden_models.segmentation.occlusion import compare_outline
-from garden_models.segmentation.region import BoxView, box_evidence, points_around
+from garden_models.segmentation.region import BoxView, box_evidence, boxes_and_nodes
 from garden_models.segmentation.support import support_of
 from garden_models.segmentation.tidy import tidy_mask
 from garden_models.segmentation.verdict import judge
@@ -43,14 +56,13 @@ class _Scene:
 
 @dataclass(frozen=True)
 class _Refined:
-    """Where views and points came to agree: node probabilities, the target's probability
-    in each view's window, and the support of the last votes.
+    """Where views and points came to agree: node probabilities, and the target's
+    probability in each view's window.
     """
 
     labels: Probabilities
     windows: list[ViewWindow | None]
     targets: list[Float32[np.ndarray, "h w"] | None]
-    votes: Votes
 
 
 DEFAULT = Segment()
@@ -73,7 +85,9 @@ def segment(
     """
     progress(0.0, "collecting points around the box")
     scene = _in_gv(reconstruction, gravity_view)
-    boxes, nodes = _boxes(scene, target, rivals, config)
+    boxes, nodes = boxes_and_nodes(
+        reconstruction, scene.cloud, scene.cameras, target, rivals, config
+    )
     graph = node_graph(
         nodes,
         reach=config.reach,
@@ -86,9 +100,7 @@ def segment(
     refined = _refined(scene, boxes[0], graph, candidates, labels, config, progress)
 
     progress(0.92, "collecting the object's points")
-    masks = tuple(
-        _mask(view.depth.shape, refined, i) for i, view in enumerate(reconstruction.views)
-    )
+    masks = tuple(_masks(reconstruction.views, refined))
     points = _own_points(scene, graph, candidates[0], refined)
     own = graph.cloud.subset(refined.labels.argmax(1) == 1)
     outlined = [
@@ -133,49 +145,6 @@ def _in_gv(reconstruction: Reconstruction, gravity_view: GravityView) -> _Scene:
     return _Scene(reconstruction, cloud, cameras)
 
 
-def _boxes(
-    scene: _Scene, target: Target, rivals: tuple[Target, ...], config: Segment
-) -> tuple[tuple[BoxView, ...], PointCloud]:
-    """Return the target's box, then those of the rivals that some of its points lie in, and
-    the points around all of them; more than ``max_nodes`` are thinned evenly.
-    """
-    registered = {view.photo for view in scene.reconstruction.views}
-    boxes: list[BoxView] = []
-    around: list[Int[np.ndarray, " m"]] = []
-    # A rival on a photo that is not registered has its own verdict; here it says nothing.
-    for one in (target, *(rival for rival in rivals if rival.photo in registered)):
-        box = box_in_view(one, scene.reconstruction)
-        view = BoxView(one, box, scene.reconstruction.views[box.view], scene.cameras[box.view])
-        if boxes and not _overlap(scene.cloud, around[0], boxes[0], view, config.box_margin):
-            continue
-        index = points_around(
-            scene.cloud,
-            view,
-            surroundings=config.surroundings,
-            before=config.depth_before,
-            behind=config.depth_behind,
-        )
-        boxes.append(view)
-        around.append(index)
-    index = np.unique(np.concatenate(around))
-    nodes = scene.cloud.subset(index)
-    if len(index) > config.max_nodes:
-        nodes = scene.cloud.subset(
-            index[np.linspace(0, len(index) - 1, config.max_nodes).astype(int)]
-        )
-        nodes = replace(nodes, spacing=nodes.spacing * np.sqrt(len(index) / config.max_nodes))
-    return tuple(boxes), nodes
-
-
-def _overlap(
-    cloud: PointCloud, around: Int[np.ndarray, " m"], own: BoxView, other: BoxView, margin: float
-) -> bool:
-    """Tell whether more than a hundredth of the points in one box lie in another's as well."""
-    xyz = cloud.xyz[around]
-    xyz = xyz[own.inside(own.project(xyz), margin)]
-    return bool(other.inside(other.project(xyz), margin).sum() > 0.01 * len(xyz))
-
-
 def _candidate(graph: NodeGraph, one: BoxView, config: Segment) -> Candidate:
     """Return a box's claim on the nodes."""
     evidence = box_evidence(graph.cloud, one, config.box_margin)
@@ -193,7 +162,7 @@ def _candidate(graph: NodeGraph, one: BoxView, config: Segment) -> Candidate:
         share = np.bincount(parts[evidence.inside], evidence.central[evidence.inside], 1)
         core = (parts == int(share.argmax())) & evidence.inside
     centrality = np.where(evidence.inside, one.centrality(one.project(graph.cloud.xyz)), 0.0)
-    return Candidate(evidence, centrality, carrier, core)
+    return Candidate(evidence, centrality, carrier, core, nearness(graph.cloud.xyz, core))
 
 
 def _refined(
@@ -214,29 +183,31 @@ def _refined(
         for i, (view, camera) in enumerate(zip(views, cameras, strict=True))
     ]
     targets: list[Float32[np.ndarray, "h w"] | None] = [None] * len(views)
-    shared, hull, votes = None, None, Votes(labels[:, 1], np.zeros(len(labels)))
+    shared: Float[np.ndarray, "2 bins"] | None = None
+    hull: VisualHull | None = None
     for turn in range(config.rounds + 1):
         counts = []
         for i, window in enumerate(windows):
             done = (turn + i / len(windows)) / (config.rounds + 1)
             progress(0.25 + 0.65 * done, f"refining {views[i].photo}")
             if window is not None:
-                seen_hull: Float32[np.ndarray, "h w"] | None = (
-                    None
-                    if hull is None
-                    else hull.silhouette(views[i].K, cameras[i], window.rows, window.columns)
-                )
+                silhouette = _silhouette(hull, views[i], cameras[i], window)
                 targets[i], count = label_pixels(
-                    window, labels[:, 1], shared, seen_hull, targets[i]
+                    window, labels[:, 1], shared, silhouette, targets[i]
                 )
                 counts.append(count)
         shared = np.sum(counts, axis=0) if counts else None
         mean, seen = votes_of_views(windows, targets, len(labels))
-        votes = Votes(mean, np.minimum(seen, 3) / 3)
-        labels = label_nodes(graph, candidates, votes, labels)
+        labels = label_nodes(graph, candidates, Votes(mean, np.minimum(seen, 3) / 3), labels)
         if turn < config.rounds:
             hull = _hull(scene, graph, candidates[0].carrier, labels, windows, targets)
-    return _Refined(labels, windows, targets, votes)
+    return _Refined(labels, windows, targets)
+
+
+def _silhouette(
+    hull: VisualHull | None, view: View, camera: Float[np.ndarray, "4 4"], window: ViewWindow
+) -> Bool[np.ndarray, "h w"] | None:
+    return None if hull is None else hull.silhouette(view.K, camera, window.rows, window.columns)
 
 
 def _hull(
@@ -267,14 +238,15 @@ def _hull(
     )
 
 
-def _mask(shape: tuple[int, ...], refined: _Refined, index: int) -> Bool[np.ndarray, "h w"]:
-    """Return one view's mask."""
-    mask = np.zeros(shape, bool)
-    window, target = refined.windows[index], refined.targets[index]
-    if window is not None and target is not None:
-        evident = (window.node >= 0) & (refined.labels[np.maximum(window.node, 0), 1] > 0.5)
-        mask[window.rows, window.columns] = tidy_mask(target > 0.5, evident)
-    return mask
+def _masks(views: tuple[View, ...], refined: _Refined) -> Iterator[Bool[np.ndarray, "h w"]]:
+    """Yield the views' masks."""
+    for view, window, target in zip(views, refined.windows, refined.targets, strict=True):
+        mask = np.zeros(view.depth.shape, bool)
+        if window is not None and target is not None:
+            label = refined.labels[np.maximum(window.node, 0), 1]
+            evident = (window.node >= 0) & (label > 0.5)
+            mask[window.rows, window.columns] = tidy_mask(target > 0.5, evident)
+        yield mask
 
 
 def _own_points(

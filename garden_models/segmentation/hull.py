@@ -6,11 +6,10 @@ cover parts of the object without texture, where stereo found no points.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Float32
 from scipy import ndimage
 
 from garden_models.geometry.camera import project
@@ -59,8 +58,8 @@ def carve(
     low: Float[np.ndarray, "3"],
     high: Float[np.ndarray, "3"],
     views: tuple[View, ...],
-    cameras: Sequence[Float[np.ndarray, "4 4"]],
-    targets: list[Float[np.ndarray, "h w"] | None],
+    cameras: tuple[Float[np.ndarray, "4 4"], ...],
+    targets: list[Float32[np.ndarray, "h w"] | None],
     windows: list[tuple[slice, slice] | None],
 ) -> VisualHull:
     """Return the hull in the box ``low``..``high`` (GV) of the target's probabilities.

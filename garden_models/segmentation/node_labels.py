@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,16 +23,16 @@ SUPPORT = 1.0
 """A node on or below the support."""
 VOTE = 0.5
 """The votes of three or more views."""
-ISOLATED = 0.1
+ISOLATED = 0.3
 """A node of a connected core that nothing joins to what is outside of the box."""
-COLOUR = 0.03
+COLOUR = 0.1
 """A node's colour, where the labels' colours differ fully."""
-INSIDE = 0.1
+INSIDE = 0.03
 """All nodes inside a box and above its support, together, in units of a cut across them:
 a thing that goes on outside of the box through more than a tenth of its width is not the
 target, however much of it is inside.
 """
-CENTRE = 0.6
+CENTRE = 0.2
 """The same for the very middle of the box, as if all nodes were there."""
 LEAK = 0.3
 """A core leaks when its joints to the outside reach this share of a cut across it."""
@@ -40,20 +41,22 @@ RISES = 3.0
 NEAR = 0.1
 """A part cut off from the core counts as near within this share of the core's size."""
 COLOUR_ROUNDS = 3
-EXCLUSIVE = 0.02
-"""What is left of a box's claim on nodes that a rival's box claims too."""
+SHARED = 0.02
+"""What is left at first of a box's claim on nodes that a rival's box claims too."""
 
 
 @dataclass(frozen=True)
 class Candidate:
     """One target's claim on the nodes: its box, how central (0..1) nodes are in it, what
-    carries it (None: nothing), and the connected nodes that fill its middle.
+    carries it (None: nothing), the connected nodes that fill its middle, and how near
+    (0..1) all nodes are to those.
     """
 
     evidence: BoxEvidence
     centrality: Float[np.ndarray, " n"]
     carrier: Carrier | None
     core: Bool[np.ndarray, " n"]
+    near: Float[np.ndarray, " n"]
 
 
 @dataclass(frozen=True)
@@ -79,34 +82,51 @@ def label_nodes(
     """
     open_to, grip = _claims(graph, candidates)
     weights = _above_support(graph, candidates)
-    drawn = np.zeros(open_to.shape)
     contested = open_to[:, 1:].sum(1)
+    draws = np.zeros(open_to.shape)
     for k, candidate in enumerate(candidates, 1):
-        share = np.where(contested == 1, 1.0, EXCLUSIVE) * open_to[:, k]
         others = [other for other in candidates if other is not candidate]
         alone = isolation(graph, weights, candidate, others)
-        near, draw = _draw(graph, candidate, share, alone * (1 - grip))
-        drawn[:, k] += near * draw
-        drawn[:, 0] += (1 - near) * draw
-    drawn[:, 0] += SUPPORT * np.where(contested == 1, grip, 0.0)
-    if votes is not None and before is not None:
-        drawn += _vote(votes, before, open_to)
-    drawn[contested == 0] = 0.0
-    drawn[contested == 0, 0] = SURE
-
-    result, bins = before, colour_bins(lab_colours(graph.cloud.rgb))
+        draws[:, k] = _draw(candidate, open_to[:, k], alone * (1 - grip))
+    bins = colour_bins(lab_colours(graph.cloud.rgb))
+    result = before
     for _ in range(COLOUR_ROUNDS + (before is None)):
-        total = drawn
+        drawn = _divided(draws, candidates, contested, result)
+        drawn[:, 0] += SUPPORT * np.where(contested == 1, grip, 0.0)
+        if votes is not None and before is not None:
+            drawn += _vote(votes, before, open_to)
         if result is not None:
             colour, sure = _colour_evidence(bins, result, graph.cloud.spacing**2)
-            total = drawn + np.where(contested[:, None] > 0, COLOUR * sure[:, None] * colour, 0.0)
-        strength = total.sum(1)
-        prior = total / np.maximum(strength, 1e-12)[:, None]
+            drawn += COLOUR * sure[:, None] * colour
+        drawn[contested == 0] = np.eye(open_to.shape[1])[0] * SURE
+        strength = drawn.sum(1)
+        prior = drawn / np.maximum(strength, 1e-12)[:, None]
         prior[strength <= 0, 0] = 1.0
         result = walk_on_graph(graph.edges, weights, prior, strength, result) * open_to
         result /= np.maximum(result.sum(1, keepdims=True), 1e-9)
     assert result is not None
     return result
+
+
+def _divided(
+    draws: Probabilities,
+    candidates: tuple[Candidate, ...],
+    contested: Int[np.ndarray, " n"],
+    before: Probabilities | None,
+) -> Probabilities:
+    """Return what draws nodes to each label: what rivals both claim belongs to one of them,
+    divided as in the last result; at first only what one alone claims counts in full.
+    """
+    near = np.column_stack([np.ones(len(draws)), *(one.near for one in candidates)])
+    drawn = draws * near
+    if before is None:
+        drawn *= np.where(contested > 1, SHARED, 1.0)[:, None]
+    else:
+        share = before[:, 1:] / np.maximum(before[:, 1:].sum(1, keepdims=True), 1e-9)
+        full = drawn[:, 1:].max(1, keepdims=True)
+        drawn[:, 1:] = np.where(contested[:, None] > 1, full * share, drawn[:, 1:])
+    drawn[:, 0] += np.where(contested == 1, (draws * (1 - near)).sum(1), 0.0)
+    return drawn
 
 
 def support_grip(graph: NodeGraph, carrier: Carrier) -> Float[np.ndarray, " n"]:
@@ -139,8 +159,8 @@ def isolation(
         outside &= ~other.evidence.inside
         if (other.core & candidate.core).any():
             core |= other.core
-    joints = weights[(core[i] & outside[j]) | (core[j] & outside[i])].sum()
-    across = 3 * np.sqrt(np.maximum(np.count_nonzero(core), 1))
+    joints = float(weights[(core[i] & outside[j]) | (core[j] & outside[i])].sum())
+    across = 3 * math.sqrt(max(int(np.count_nonzero(core)), 1))
     return float(np.exp(-((joints / across / LEAK) ** 2)))
 
 
@@ -153,13 +173,13 @@ def _above_support(graph: NodeGraph, candidates: tuple[Candidate, ...]) -> Float
     kept = np.ones(len(graph.cloud))
     for k, candidate in enumerate(candidates):
         if candidate.carrier is not None:
-            near = np.abs(candidate.carrier.below) < 1.5 * candidate.carrier.band
+            depth = np.abs(candidate.carrier.below) / candidate.carrier.band
+            near = depth < 1.5
             # A rival may stand on the target: its support then counts in its own box only.
             near &= candidate.evidence.inside if k else True
             kept *= np.where(near, 1 - support_grip(graph, candidate.carrier), 1.0)
             # Outside of the box, what hardly rises above the support is its noise.
-            low = np.abs(candidate.carrier.below) < RISES * candidate.carrier.band
-            kept[low & ~candidate.evidence.inside] = 0.0
+            kept[(depth < RISES) & ~candidate.evidence.inside] = 0.0
     i, j = graph.edges.T
     return graph.weights * kept[i] * kept[j]
 
@@ -179,27 +199,33 @@ def _claims(
     return open_to, on_support
 
 
+def nearness(
+    xyz: Float[np.ndarray, "n 3"], core: Bool[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
+    """Return 1 for the nodes of a core, falling to 0 with the distance from it: what is near
+    may be a part of it that holes in the points cut off.
+    """
+    if not core.any():
+        return np.ones(len(xyz))
+    low, high = np.percentile(xyz[core], [2, 98], axis=0)
+    size = float(np.linalg.norm(high - low))
+    reach = max(NEAR * size, 1e-12)
+    distance, _ = cKDTree(xyz[core]).query(xyz, distance_upper_bound=4 * reach, workers=2)
+    return np.where(core, 1.0, 0.8 * np.exp(-((distance / reach) ** 2)))
+
+
 def _draw(
-    graph: NodeGraph,
-    candidate: Candidate,
-    share: Float[np.ndarray, " n"],
-    alone: Float[np.ndarray, " n"],
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """Return how near (0..1) nodes are to a candidate's core, and how strongly it draws them.
+    candidate: Candidate, claimed: Bool[np.ndarray, " n"], alone: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
+    """Return how strongly a candidate draws the nodes that it claims.
 
     ``alone`` (0..1) says how isolated the core is, and that a node is not of the support.
     """
-    near = np.ones(len(graph.cloud))
-    core = graph.cloud.xyz[candidate.core]
-    if len(core):
-        distance, _ = cKDTree(core).query(graph.cloud.xyz, workers=2)
-        size = float(np.linalg.norm(np.ptp(np.percentile(core, [2, 98], axis=0), axis=0)))
-        apart = 0.8 * np.exp(-((distance / max(NEAR * size, 1e-12)) ** 2))
-        near = np.where(candidate.core, 1.0, apart)
     # Counted over a surface of n nodes, a cut across it meets about sqrt(n) of them.
-    weak = 1.0 / np.sqrt(np.maximum(np.count_nonzero(share), 1))
-    middle = near * candidate.centrality * candidate.evidence.seen
-    return near, share * (weak * (INSIDE + CENTRE * middle) + ISOLATED * candidate.core * alone)
+    weak = 1.0 / math.sqrt(max(int(np.count_nonzero(claimed)), 1))
+    middle = candidate.near * candidate.centrality * candidate.evidence.seen
+    claim = weak * (INSIDE + CENTRE * middle) + ISOLATED * candidate.core * alone
+    return claimed * claim
 
 
 def _vote(
@@ -229,4 +255,5 @@ def _colour_evidence(
     sizes[0] = sizes[1:].sum()
     colour = colour_posterior(counts, sizes / max(float(sizes.sum()), 1e-12))[bins]
     count = labels.shape[1]
-    return colour, (((count * colour.max(1) - 1) / (count - 1)).clip(0, 1)) ** 2
+    best: Float[np.ndarray, " n"] = colour.max(axis=1)
+    return colour, ((count * best - 1) / (count - 1)).clip(0, 1) ** 2

@@ -35,9 +35,8 @@ def compare_outline(
 ) -> Outlined:
     """Draw the object's points alone, in a picture wide enough to hold them.
 
-    Hidden is what falls outside of the real picture, or what the mask leaves out where
-    the view's depth is nearer than the object by more than its points' spacing. An object
-    behind the camera is hidden whole.
+    Hidden is what falls outside of the real picture, or what the mask leaves out, but for
+    where the view sees past the object's depth. An object behind the camera is hidden whole.
     """
     width, height = view.size
     seen = project_points(own.xyz, view.K, camera_from_points, view.size)
@@ -60,8 +59,8 @@ def compare_outline(
     window = (slice(before[1], before[1] + height), slice(before[0], before[0] + width))
     inside, z = outline[window], front.z[window]
     tolerance = 4 * float(np.median(own.spacing))
-    nearer = (view.depth > 0) & (view.depth < 0.99 * z - tolerance) & np.isfinite(z)
-    covered = inside & ~mask & nearer
+    seen_past = (view.depth > 1.01 * z + tolerance) | ~np.isfinite(z)
+    covered = inside & ~mask & ~seen_past
     hidden = int(outline.sum() - inside.sum() + covered.sum())
     visible = inside & ~covered
     union = np.count_nonzero(visible | mask)

@@ -15,6 +15,7 @@ minimal cut.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Float32, Int
@@ -80,9 +81,9 @@ def walk_on_image(
         edges = _reweighted(edges, start)
     strength = np.maximum(strength, np.float32(LEAST_STRENGTH))
     right, down, falling, rising = edges
-    pieces: tuple[tuple[np.ndarray, tuple[slice, ...], tuple[slice, ...]], ...] = (
+    pieces: tuple[tuple[np.ndarray, Any, Any], ...] = (
         (right, np.s_[:, :-1], np.s_[:, 1:]),
-        (down, np.s_[:-1, :], np.s_[1:, :]),
+        (down, np.s_[:-1], np.s_[1:]),
         (falling, np.s_[:-1, :-1], np.s_[1:, 1:]),
         (rising, np.s_[:-1, 1:], np.s_[1:, :-1]),
     )

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy import ndimage
 
-from garden_models.scene import BadGeometry, PointCloud, Target, View
-from garden_models.segmentation.box import ViewBox
+from garden_models.scene import BadGeometry, PointCloud, Reconstruction, Target, View
+from garden_models.segmentation.box import ViewBox, box_in_view
 from garden_models.segmentation.carrier import BoxEvidence
+from garden_models.segmentation.config import Segment
 from garden_models.segmentation.zbuffer import Projection, front_points, project_points
 
 FRONT = 0.3
@@ -50,6 +51,72 @@ class BoxView:
         limit = nearest[seen.flat[out]] + 4 * cloud.spacing[out]
         out[out] = seen.z[out] <= limit
         return out
+
+
+def boxes_and_nodes(
+    reconstruction: Reconstruction,
+    cloud: PointCloud,
+    cameras: tuple[Float[np.ndarray, "4 4"], ...],
+    target: Target,
+    rivals: tuple[Target, ...],
+    config: Segment,
+) -> tuple[tuple[BoxView, ...], PointCloud]:
+    """Return the target's box, then those of the rivals that some of its points lie in, and
+    the points around all of them; more than ``max_nodes`` are thinned evenly.
+    """
+    registered = {view.photo for view in reconstruction.views}
+    boxes: list[BoxView] = []
+    around: list[Int[np.ndarray, " m"]] = []
+    # A rival on a photo that is not registered has its own verdict; here it says nothing.
+    for one in (target, *(rival for rival in rivals if rival.photo in registered)):
+        box = box_in_view(one, reconstruction)
+        view = BoxView(one, box, reconstruction.views[box.view], cameras[box.view])
+        if boxes and not _overlap(cloud, around[0], boxes[0], view, config.box_margin):
+            continue
+        index = points_around(
+            cloud,
+            view,
+            surroundings=config.surroundings,
+            before=config.depth_before,
+            behind=config.depth_behind,
+        )
+        boxes.append(view)
+        around.append(index)
+    return tuple(boxes), _nodes(cloud, boxes, np.unique(np.concatenate(around)), config)
+
+
+def _nodes(
+    cloud: PointCloud, boxes: list[BoxView], around: Int[np.ndarray, " m"], config: Segment
+) -> PointCloud:
+    """Return the points around the boxes, thinned evenly to ``max_nodes``: those in a box
+    least, so that two thirds of the nodes, if there are as many points, are in boxes.
+    """
+    points = cloud.subset(around)
+    inside = np.zeros(len(around), bool)
+    for box in boxes:
+        inside |= box.inside(box.project(points.xyz), config.box_margin)
+    parts = []
+    for keep, room in ((inside, 2 * config.max_nodes // 3), (~inside, config.max_nodes // 3)):
+        part = np.flatnonzero(keep)
+        growth = max(len(part) / room, 1.0)
+        chosen = part[np.linspace(0, len(part) - 1, int(len(part) / growth)).astype(int)]
+        kept = points.subset(chosen)
+        parts.append(replace(kept, spacing=kept.spacing * np.sqrt(growth)))
+    return PointCloud(
+        *(
+            np.concatenate([getattr(part, field.name) for part in parts])
+            for field in fields(PointCloud)
+        )
+    )
+
+
+def _overlap(
+    cloud: PointCloud, around: Int[np.ndarray, " m"], own: BoxView, other: BoxView, margin: float
+) -> bool:
+    """Tell whether more than a hundredth of the points in one box lie in another's as well."""
+    xyz = cloud.xyz[around]
+    xyz = xyz[own.inside(own.project(xyz), margin)]
+    return bool(other.inside(other.project(xyz), margin).sum() > 0.01 * len(xyz))
 
 
 def points_around(

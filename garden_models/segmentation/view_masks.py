@@ -22,9 +22,12 @@ DEPTH_TRUST = 0.5
 """Strength of a pixel's own depth, when it lies on a labelled point (edges are up to 1)."""
 SPLAT_TRUST = 0.1
 """Strength of a point seen by other views, where this view has no depth of its own."""
-JUMP_TRUST = 0.1
-"""What is left of the trust in depth beside a jump, which stereo fattens by some pixels."""
-COLOUR_STRENGTH = 0.02
+JUMP_TRUST = 0.2
+"""What is left of the trust in depth beside a jump, which stereo fattens by some pixels, and
+in labels where they change."""
+JUMP_WINDOW = 5
+"""Pixels across which a jump is felt: about half of a matching window of stereo to both sides."""
+COLOUR_STRENGTH = 0.01
 HULL_OUTSIDE = 0.2
 """Strength with which pixels that miss the visual hull are background."""
 HULL_INSIDE = 0.004
@@ -195,10 +198,10 @@ def _visible(
 
 
 def _jumps(values: Float[np.ndarray, "h w"], limit: float) -> Bool[np.ndarray, "h w"]:
-    """Tell around which pixels (5 x 5) values differ by more than ``limit``; NaN: unknown."""
+    """Tell around which pixels values differ by more than ``limit``; NaN: unknown."""
     unknown = np.isnan(values)
-    high = ndimage.maximum_filter(np.where(unknown, -np.inf, values), 5)
-    low = ndimage.minimum_filter(np.where(unknown, np.inf, values), 5)
+    high = ndimage.maximum_filter(np.where(unknown, -np.inf, values), JUMP_WINDOW)
+    low = ndimage.minimum_filter(np.where(unknown, np.inf, values), JUMP_WINDOW)
     return np.nan_to_num(high - low, nan=0.0, posinf=0.0, neginf=0.0) > limit
 
 

@@ -40,7 +40,7 @@ class RayScene:
     seed: int = 0
 
     @property
-    def K(self) -> np.ndarray:  # noqa: N802 - the name of the matrix
+    def K(self) -> np.ndarray:  # noqa: N802
         return np.array(
             [[self.focal, 0, self.size[0] / 2], [0, self.focal, self.size[1] / 2], [0, 0, 1.0]]
         )
