@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
-from garden_models.geometry.rigid import rigid, transform_points
+from garden_models.geometry.rigid import transform_points
+from garden_models.physics.body import make_body
 from garden_models.physics.config import Compose
-from garden_models.physics.convex_pieces import convex_pieces
-from garden_models.physics.inertia import mass_properties
-from garden_models.physics.levelling import bottom_gv, level_pieces, noise_m
+from garden_models.physics.levelling import noise_m
 from garden_models.physics.merge_supports import merge_supports
 from garden_models.physics.separate import separate
 from garden_models.physics.support_surfaces import find_support_surfaces
+from garden_models.physics.trimming import deep_contacts_gv, trim_overlaps
 from garden_models.progress import Progress, silent
 from garden_models.scene import (
     OK,
     Background,
+    BadGeometry,
     BadInput,
     Body,
     GravityView,
@@ -49,8 +51,9 @@ def compose(
     horizontal surfaces of the background and each object's own. Every object is set down on
     its support: lifted if it starts deeper inside than its mesh's noise, lowered if it is just
     above, its colliders levelled within that noise (see ``levelling``). Objects that overlap
-    are moved apart. An object without a support is kept fixed where it is and reported
-    ``degraded``.
+    are trimmed (see ``trimming``) or, where that is not enough, moved apart. An object without
+    a support is kept fixed where it is and reported ``degraded``; one whose mesh encloses
+    nothing is left out and named in the verdict.
     ``camera_centres_gv`` defaults to the reference camera, the origin of Gravity-View.
 
     Raises BadInput if the three tuples do not belong together.
@@ -68,14 +71,9 @@ def compose(
     supports, carriers = merge_supports(
         found, tuple(m.support for m in masks), names, placed, config.merge
     )
-    bodies = []
-    for i, (mesh, placement) in enumerate(zip(meshes, placements, strict=True)):
-        progress((i + 0.5) / (len(meshes) + 1), f"colliders of {mesh.name}")
-        support = next((s for s in supports if s.name == carriers[i]), None)
-        bodies.append(make_body(mesh, placement, carriers[i], support, config))
+    bodies, verdict = _bodies(meshes, placements, carriers, supports, config, progress)
     progress(len(meshes) / (len(meshes) + 1), "moving overlapping bodies apart")
-    apart = _apart(tuple(bodies), supports, config)
-    verdict = OK
+    apart = _apart(bodies, supports, config)
     for body in apart:
         verdict = verdict.worst(body.verdict)
     if scale.source in ("unknown", "prior"):
@@ -84,77 +82,53 @@ def compose(
     return SimScene(apart, supports, scale, verdict)
 
 
-def make_body(
-    mesh: ObjectMesh,
-    placement: Placement,
-    carrier: str,
-    support: SupportSurface | None,
+def _bodies(
+    meshes: tuple[ObjectMesh, ...],
+    placements: tuple[Placement, ...],
+    carriers: list[str],
+    supports: tuple[SupportSurface, ...],
     config: Compose,
-) -> Body:
-    """Return one object as a body that stands on its support.
+    progress: Progress,
+) -> tuple[tuple[Body, ...], Verdict]:
+    """Make every body, those that touch another with finer colliders there."""
+    verdict = OK
+    bodies: list[Body] = []
+    inputs: list[tuple[ObjectMesh, Placement, str, SupportSurface | None]] = []
+    for i, (mesh, placement) in enumerate(zip(meshes, placements, strict=True)):
+        progress((i + 0.5) / (len(meshes) + 1), f"colliders of {mesh.name}")
+        support = next((s for s in supports if s.name == carriers[i]), None)
+        try:
+            bodies.append(make_body(mesh, placement, carriers[i], support, config))
+        except BadGeometry as problem:
+            reason = f"{mesh.name} is left out of the simulation: {problem}"
+            verdict = verdict.worst(Verdict("degraded", (reason,)))
+            continue
+        inputs.append((mesh, placement, carriers[i], support))
+    touched = deep_contacts_gv(tuple(bodies), _allowed_trims(bodies, config))
+    finer = [
+        make_body(*given, config, points) if len(points) else body
+        for body, given, points in zip(bodies, inputs, touched, strict=True)
+    ]
+    return tuple(_without_lost_carriers(finer, supports)), verdict
 
-    ``carrier`` names what carries it (a support, another object, or "" for nothing);
-    ``support`` is the surface if it is one.
-    """
-    hypothesis = placement.best
-    vertices = np.asarray(mesh.vertices, np.float64) * hypothesis.scale
-    gv_from_body = rigid(hypothesis.rotation_gv, hypothesis.translation_gv)
-    size = float(np.ptp(vertices, axis=0).max())
-    tolerance = noise_m(vertices, config.noise)
-    pieces = convex_pieces(vertices, mesh.faces, tolerance, config.convexity)
-    mass = mass_properties(vertices, mesh.faces, config.density)
-    reasons: list[str] = []
-    remarks: list[str] = []
-    lifted = 0.0
-    if support is not None:
-        below = bottom_gv(transform_points(gv_from_body, vertices), config.noise)
-        inside = below - support.height_gv
-        # Within the noise it stays where it is: levelling the colliders takes up the rest.
-        if inside > tolerance:
-            lifted = inside - tolerance
-        elif -config.lowest_drop * size <= inside < -0.5 * tolerance:
-            lifted = inside
-        if lifted > config.most_shift * size:
-            reasons.append(
-                f"{mesh.name} was lifted {lifted:.3g} m ({lifted / size:.0%} of its size) out of "
-                f"{support.name}"
-            )
-        elif inside < -config.lowest_drop * size:
-            reasons.append(
-                f"{mesh.name} starts {-inside:.3g} m above {support.name}, more than the noise of "
-                "its mesh, so it drops"
-            )
-        gv_from_body[1, 3] -= lifted
-        pieces = level_pieces(pieces, gv_from_body, support.height_gv, tolerance)
-        remarks.append(
-            f"the colliders' lowest {tolerance * 1e3:.2g} mm, the noise of the mesh, were made "
-            f"level with {support.name}"
-        )
-    elif not carrier:
-        reasons.append(f"nothing was found that carries {mesh.name}: it is kept fixed in its place")
-    return Body(
-        name=mesh.name,
-        vertices=vertices,
-        faces=mesh.faces,
-        vertex_rgb=mesh.vertex_rgb,
-        colliders=pieces,
-        mass_kg=mass.mass_kg,
-        centre_of_mass=mass.centre_of_mass,
-        inertia=mass.inertia,
-        friction=config.friction,
-        gv_from_body=gv_from_body,
-        lifted_m=float(lifted),
-        supported_by=carrier,
-        physics_note="; ".join(
-            [
-                mass.note,
-                f"friction {config.friction:g}, assumed (dry wood, plastic, ceramics: 0.3 to 0.6)",
-                f"{len(pieces)} convex collider{'s' if len(pieces) > 1 else ''}",
-                *remarks,
-            ]
-        ),
-        verdict=Verdict("degraded", tuple(reasons)) if reasons else OK,
-    )
+
+def _allowed_trims(bodies: Sequence[Body], config: Compose) -> list[float]:
+    """Return how much of each body's colliders may be cut back (metres)."""
+    return [config.trim * noise_m(body.vertices, config.noise) for body in bodies]
+
+
+def _without_lost_carriers(bodies: list[Body], supports: tuple[SupportSurface, ...]) -> list[Body]:
+    """Fix the bodies in place that stood on an object which was left out."""
+    there = {"", *(body.name for body in bodies), *(support.name for support in supports)}
+    out = []
+    for body in bodies:
+        if body.supported_by not in there:
+            reason = f"{body.supported_by}, which carries {body.name}, was left out"
+            verdict = body.verdict.worst(Verdict("degraded", (reason,)))
+            out.append(replace(body, supported_by="", verdict=verdict))
+        else:
+            out.append(body)
+    return out
 
 
 def _placed_vertices_gv(mesh: ObjectMesh, placement: Placement) -> Float[np.ndarray, "v 3"]:
@@ -165,10 +139,11 @@ def _placed_vertices_gv(mesh: ObjectMesh, placement: Placement) -> Float[np.ndar
 def _apart(
     bodies: tuple[Body, ...], supports: tuple[SupportSurface, ...], config: Compose
 ) -> tuple[Body, ...]:
-    """Move overlapping bodies apart and say so on each."""
+    """Trim or move overlapping bodies apart and say so on each."""
+    bodies, trims = trim_overlaps(bodies, _allowed_trims(bodies, config), config.separation)
     moves, left = separate(bodies, supports, config.separation)
     out = []
-    for body, move in zip(bodies, moves, strict=True):
+    for body, move, trim in zip(bodies, moves, trims, strict=True):
         size = float(np.ptp(body.vertices, axis=0).max())
         pushed = float(np.hypot(move[0], move[2]))
         reasons = []
@@ -179,6 +154,9 @@ def _apart(
             )
         if left > 10 * config.separation.allowed_overlap_m and np.any(move):
             reasons.append(f"{body.name} still overlaps something by up to {left:.3g} m")
+        note = body.physics_note
+        if trim > 0:
+            note += f"; colliders cut back by up to {trim * 1e3:.2g} mm where they touched another"
         gv_from_body = body.gv_from_body.copy()
         gv_from_body[:3, 3] += move
         verdict = body.verdict
@@ -190,6 +168,7 @@ def _apart(
                 gv_from_body=gv_from_body,
                 lifted_m=float(body.lifted_m - move[1]),
                 pushed_m=pushed,
+                physics_note=note,
                 verdict=verdict,
             )
         )

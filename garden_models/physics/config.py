@@ -52,11 +52,17 @@ class MergeSupports:
 class Cutting:
     """How finely a mesh is cut."""
 
-    most_pieces: int = 16
-    most_empty: float = 0.08
+    most_pieces: int = 24
+    most_empty: float = 0.05
     """Empty space in all hulls together, relative to the mesh's volume, that may stay."""
-    least_gain: float = 0.01
-    """A part that holds less empty space than this share of the mesh's volume stays whole."""
+    most_out: float = 0.03
+    """How far a piece may reach out of the mesh, beside its noise, of the mesh's extent."""
+    most_out_in_focus: float = 0.005
+    focus_pieces: int = 16
+    """Closer limit, and further pieces, where another object touches."""
+    least_gain: float = 0.2
+    """A part that holds less than this share of the empty space that may stay is not cut for
+    it."""
     positions: int = 7
     """Planes that are tried per axis."""
     balance: float = 0.02
@@ -132,6 +138,9 @@ class Compose:
     separation: Separation = field(default_factory=Separation)
     friction: float = 0.5
     """Coulomb friction of dry wood, plastic and ceramics on wood lies at 0.3 to 0.6."""
+    trim: float = 2.0
+    """Colliders of touching objects may be cut back by this many times the mesh's noise: hulls
+    rest on the noise's peaks."""
     lowest_drop: float = 0.03
     """An object less than this share of its size above its support is lowered onto it; a
     placement is not more exact than that. One that hangs higher is left to fall."""

@@ -17,18 +17,20 @@ def convex_pieces(
     faces: Int[np.ndarray, "f 3"],
     noise_m: float = 0.0,
     config: Convexity = Convexity(),
+    focus: Float[np.ndarray, "n 3"] | None = None,
 ) -> tuple[ConvexPiece, ...]:
     """Return convex pieces that together approximate a closed mesh, largest first.
 
     ``vertices`` are upright (y down), in metres; ``noise_m`` is their noise, which is not
-    cut out. Raises BadGeometry if the mesh is flat, so that it has no convex piece.
+    cut out. Pieces are finer around the ``focus`` points (where another object touches).
+    Raises BadGeometry if the mesh is flat, so that it has no convex piece.
     """
     thinnest = config.thinnest * float(np.ptp(vertices, axis=0).max())
     if hull_piece(vertices, thinnest) is None:
         raise BadGeometry("the mesh is flat, so nothing can collide with it: mesh it again")
     hulls = [
         hull_piece(points, thinnest)
-        for points in cut_boxes(vertices, faces, noise_m, config.cutting)
+        for points in cut_boxes(vertices, faces, noise_m, config.cutting, focus)
     ]
     pieces = [_with_few_vertices(hull, config) for hull in hulls if hull is not None]
     volumes = [solid_properties(piece.vertices, piece.faces).volume for piece in pieces]

@@ -1,12 +1,12 @@
 """Cut a closed mesh into few convex pieces by recursive planes, in bounded time.
 
-Greedy splitting as in V-HACD (Mamou 2016): the part whose convex hull holds the
-most empty space is cut by the axis-parallel plane that leaves the least, until little is left
-or there are enough parts. A part is the mesh within a box, and its collider the hull of the
-mesh's surface points in that box, so that pieces never stick out of the mesh's own hull.
-Axes are the upright object's: vertical, and along and across its footprint. A cut costs
-some 40 small hulls, so that 16 pieces take about a second whatever the mesh. (CoACD 1.0.14,
-at 1500 faces and 16 pieces, took 10 to 35 s of a mug, with hulls of the same volume.)
+Greedy splitting as in V-HACD (Mamou 2016): the worst part is cut by the axis-parallel plane
+that leaves the least empty space in convex hulls, until the parts are good or many enough. A
+part is the mesh within a box, and its collider the hull of the mesh's surface points in that
+box, so that pieces never stick out of the mesh's own hull. Axes are the upright object's:
+vertical, and along and across its footprint. A cut costs some 40 small hulls, so that 24
+pieces take about a second whatever the mesh. (CoACD 1.0.14, at 1500 faces and 16 pieces, took
+10 to 35 s of a mug, with hulls of the same volume.)
 """
 
 from __future__ import annotations
@@ -17,17 +17,20 @@ import cv2
 import numpy as np
 import trimesh
 from jaxtyping import Bool, Float, Int
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from garden_models.geometry.rotation import yaw_gv
 from garden_models.physics.config import Cutting
 
 Points = Float[np.ndarray, "n 3"]
 
+PEAKS = 3.0
+"""How many standard deviations high the peaks of noise are that a hull rests on."""
+
 
 @dataclass(frozen=True)
 class _Part:
-    """Surface points (indices) and filled cells in a box, and the empty space in the hull."""
+    """The mesh in a box: its hull's volume, and how much of it is empty space."""
 
     low: Float[np.ndarray, "3"]
     high: Float[np.ndarray, "3"]
@@ -37,19 +40,42 @@ class _Part:
 
 @dataclass(frozen=True)
 class _Solid:
-    """Surface samples, inner cell centres, the volume of a cell and the surface's noise."""
+    """Surface samples (a few), inner cell centres, the volume of a cell, the surface's noise,
+    all samples of surface and inside as a tree, and the points of focus.
+    """
 
     surface: Points
     inner: Points
     cell_volume: float
     noise_m: float
+    tree: cKDTree
+    focus: Points
 
     def part(self, low: Float[np.ndarray, "3"], high: Float[np.ndarray, "3"]) -> _Part:
         """Measure the part in a box."""
-        hull, area = _hull_size(self.surface[_in_box(self.surface, low, high)])
+        hull = _hull(self.surface[_in_box(self.surface, low, high)])
+        if hull is None:
+            return _Part(low, high, 0.0, 0.0)
         filled = float(_in_box(self.inner, low, high).sum()) * self.cell_volume
         # A hull rests on the noise's peaks: half that layer is not empty space.
-        return _Part(low, high, hull, max(hull - filled - self.noise_m / 2 * area, 0.0))
+        empty = max(float(hull.volume) - filled - self.noise_m / 2 * float(hull.area), 0.0)
+        return _Part(low, high, float(hull.volume), empty)
+
+    def reach_out(self, part: _Part) -> float:
+        """Return how far the part's hull reaches out of the mesh (metres)."""
+        inside = self.surface[_in_box(self.surface, part.low, part.high)]
+        hull = _hull(inside)
+        if hull is None:
+            return 0.0
+        corners = inside[hull.simplices]
+        middles = (corners + np.roll(corners, 1, axis=1)) / 2
+        asked = np.concatenate([corners.mean(axis=1), middles.reshape(-1, 3)])
+        return float(self.tree.query(asked)[0].max())
+
+    def is_in_focus(self, part: _Part) -> bool:
+        """Tell whether a point of focus lies in or next to a part."""
+        margin = 2 * self.noise_m
+        return bool(_in_box(self.focus, part.low - margin, part.high + margin).any())
 
 
 def cut_boxes(
@@ -57,34 +83,67 @@ def cut_boxes(
     faces: Int[np.ndarray, "f 3"],
     noise_m: float,
     config: Cutting = Cutting(),
+    focus: Points | None = None,
 ) -> tuple[Points, ...]:
     """Return, for each convex piece, the surface points of the mesh that it is the hull of.
 
-    ``vertices`` are upright (y down), in metres; ``noise_m`` is their noise.
+    ``vertices`` are upright (y down), in metres; ``noise_m`` is their noise. Parts around the
+    ``focus`` points (same frame) follow the mesh more closely, and may be more in number.
     """
     turn = yaw_gv(_footprint_yaw(vertices))
     turned = np.asarray(vertices, np.float64) @ turn
     points = _surface_points(turned, faces, config)
     rng = np.random.default_rng(config.seed)
-    some = rng.permutation(len(points))[: config.surface_points]
-    solid = _Solid(points[np.sort(some)], *_inner_cells(turned, faces, config.cells), noise_m)
-    volume = max(len(solid.inner) * solid.cell_volume, 1e-12)
-    parts = [solid.part(points.min(axis=0) - 1e-9, points.max(axis=0) + 1e-9)]
+    some = np.sort(rng.permutation(len(points))[: config.surface_points])
+    inner, cell_volume = _inner_cells(turned, faces, config.cells)
+    tree = cKDTree(np.concatenate([points, inner]))
+    near = np.zeros((0, 3)) if focus is None else focus @ turn
+    solid = _Solid(points[some], inner, cell_volume, noise_m, tree, near)
+    parts = _cut(solid, points, config)
+    boxes = [_in_box(points, part.low, part.high) for part in parts]
+    return tuple(points[box] @ turn.T for box in boxes if box.sum() >= 4)
+
+
+def _cut(solid: _Solid, points: Points, config: Cutting) -> list[_Part]:
+    """Split the whole mesh until its parts are good enough, or many enough.
+
+    The worst part is the one with the most empty space while there is too much of it in all,
+    or else the one that reaches farthest out of the mesh.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    empty_limit = config.most_empty * max(len(solid.inner) * solid.cell_volume, 1e-12)
+    size = float((high - low).max())
+    most_pieces = config.most_pieces + (config.focus_pieces if len(solid.focus) else 0)
+
+    def out(part: _Part) -> float:
+        """Return how far a part reaches out, relative to what it may."""
+        if solid.is_in_focus(part):
+            allowed = config.most_out_in_focus * size + solid.noise_m
+        else:
+            allowed = config.most_out * size + PEAKS * solid.noise_m
+        return solid.reach_out(part) / allowed
+
+    parts = [solid.part(low - 1e-9, high + 1e-9)]
+    outs = [out(parts[0])]
     whole: list[_Part] = []
-    while parts and len(parts) + len(whole) < config.most_pieces:
-        if sum(part.empty for part in parts + whole) <= config.most_empty * volume:
+    while parts and len(parts) + len(whole) < most_pieces:
+        is_empty = sum(part.empty for part in parts + whole) > empty_limit
+        badness = [
+            max(reach, 1 + part.empty / empty_limit if is_empty else 0.0)
+            for part, reach in zip(parts, outs, strict=True)
+        ]
+        worst = int(np.argmax(badness))
+        if badness[worst] <= 1:
             break
-        worst = max(range(len(parts)), key=lambda i: parts[i].empty)
-        part = parts.pop(worst)
-        children = None
-        if part.empty > config.least_gain * volume:
-            children = _best_cut(solid, part, config)
+        part, reach = parts.pop(worst), outs.pop(worst)
+        is_worth = part.empty >= config.least_gain * empty_limit or reach > 1
+        children = _best_cut(solid, part, config) if is_worth else None
         if children is None:
             whole.append(part)
         else:
-            parts.extend(children)
-    boxes = [_in_box(points, part.low, part.high) for part in parts + whole]
-    return tuple(points[box] @ turn.T for box in boxes if box.sum() >= 4)
+            parts += children
+            outs += [out(child) for child in children]
+    return parts + whole
 
 
 def _footprint_yaw(vertices: Float[np.ndarray, "v 3"]) -> float:
@@ -143,15 +202,14 @@ def _in_box(
     return np.asarray(((points >= low) & (points <= high)).all(axis=1))
 
 
-def _hull_size(points: Points) -> tuple[float, float]:
-    """Return volume and area of the convex hull; zeros for flat or few points."""
+def _hull(points: Points) -> ConvexHull | None:
+    """Return the convex hull; None for flat or few points."""
     if len(points) < 4:
-        return 0.0, 0.0
+        return None
     try:
-        hull = ConvexHull(points)
+        return ConvexHull(points)
     except QhullError:
-        return 0.0, 0.0
-    return float(hull.volume), float(hull.area)
+        return None
 
 
 def _best_cut(solid: _Solid, part: _Part, config: Cutting) -> tuple[_Part, _Part] | None:

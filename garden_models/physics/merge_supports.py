@@ -30,7 +30,10 @@ def merge_supports(
     carried there. If the top of another object is at that height, that object
     carries it. Else the own support is added.
     """
-    supports = list(found)
+    # Bodies and supports share one space of names in a simulator.
+    supports = [
+        replace(one, name=f"support_{one.name}") if one.name in names else one for one in found
+    ]
     carriers: list[str] = []
     for i, (support, vertices) in enumerate(zip(own, placed_gv, strict=True)):
         if support is None:

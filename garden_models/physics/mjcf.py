@@ -8,6 +8,7 @@ contact parameter that is set; everything else is MuJoCo's default, and nothing 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from xml.etree import ElementTree
@@ -101,8 +102,12 @@ class _Meshes:
     files: dict[str, str]
 
     def add(self, name: str, vertices: np.ndarray, faces: np.ndarray) -> None:
-        """Name a mesh in the model and keep its file."""
-        file = f"{self.prefix}{name}.obj"
+        """Name a mesh in the model and keep its file, whose name is safe and its own."""
+        stem = re.sub(r"[^A-Za-z0-9_-]+", "_", name)
+        file = f"{self.prefix}{stem}.obj"
+        while file in self.files:
+            stem += "_"
+            file = f"{self.prefix}{stem}.obj"
         self.files[file] = obj_text(vertices, faces)
         ElementTree.SubElement(self.element, "mesh", name=name, file=file)
 

@@ -106,8 +106,8 @@ def _motion(
     size = float(np.ptp(body.vertices, axis=0).max())
     reasons = []
     if is_free(body):
-        fell = float(centres[-1, 1] - centres[0, 1])
-        if fell > 0.5 * np.ptp(body.vertices[:, 1]) + config.most_drift * size:
+        if _is_off(scene, body, centres):
+            fell = float(centres[-1, 1] - centres[0, 1])
             reasons.append(f"{body.name} fell {fell:.3g} m off {body.supported_by}")
         if tilt > config.most_tilt_deg:
             reasons.append(
@@ -122,6 +122,13 @@ def _motion(
             reasons.append(f"{body.name} still moves after {times_s[-1]:.1f} s")
     verdict = Verdict("degraded", tuple(reasons)) if reasons else OK
     return BodyMotion(body.name, tilt, drift, float(penetration_m), at_rest, verdict)
+
+
+def _is_off(scene: SimScene, body: Body, centres: Float[np.ndarray, "t 3"]) -> bool:
+    """Tell whether a body's centre of mass ended below what carried it at the start."""
+    heights = {support.name: support.height_gv for support in scene.supports}
+    lowest = body.vertices @ body.gv_from_body[1, :3] + body.gv_from_body[1, 3]
+    return bool(centres[-1, 1] > heights.get(body.supported_by, float(lowest.max())))
 
 
 def _turn_deg(a: Float[np.ndarray, "3 3"], b: Float[np.ndarray, "3 3"]) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from garden_models.physics.config import Cutting
 from garden_models.physics.convex_pieces import convex_pieces, hull_piece
 from garden_models.physics.inertia import solid_properties
 from garden_models.scene import BadGeometry
@@ -35,7 +36,7 @@ def test_concave_things_are_cut_well(make):
     pieces = convex_pieces(mesh.vertices, mesh.faces)
     solid = solid_properties(mesh.vertices, mesh.faces).volume
     hull = trimesh.convex.convex_hull(mesh.vertices).volume
-    assert 1 < len(pieces) <= 16
+    assert 1 < len(pieces) <= Cutting().most_pieces
     assert volume(pieces) < min(1.6 * solid, 0.6 * hull)
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     for piece in pieces:

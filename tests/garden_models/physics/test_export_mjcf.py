@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -81,3 +84,13 @@ def test_gravity_view_and_zup_are_the_same_physics(scene):
         mujoco.mj_step(model, data, nstep=1000)
         ends.append(data.xpos @ frame)
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-4)
+
+
+def test_names_of_objects_make_safe_file_names(scene):
+    named = [replace(body, name=f"../{i} é") for i, body in enumerate(scene.bodies)]
+    renamed = replace(scene, bodies=tuple(named))
+    mjcf = mjcf_zup(renamed)
+    assert len(mjcf.assets) == len(mjcf_zup(scene).assets)
+    assert all(re.fullmatch(r"assets/[A-Za-z0-9_-]+\.obj", name) for name in mjcf.assets)
+    model = mujoco.MjModel.from_xml_string(mjcf.xml, mjcf.asset_bytes)
+    assert model.body("../0 é").id > 0
