@@ -49,23 +49,36 @@ def render_scene(
     """
     if isinstance(background, PointCloud):
         background = splat_points(background, camera_from_gv, K, size, config.splatting)
-    behind = background.depth + background.thickness
-    fine = config.smoothing
-    width, height = size
-    limit = np.where(background.depth > 0, behind, np.inf)
-    limit = np.kron(limit, np.ones((fine, fine)))
-    fine_K = np.diag([fine, fine, 1.0]) @ K
+    neutral = np.array(config.neutral, np.float32)
+    base = np.where(background.depth[..., None] > 0, background.rgb, neutral)
+    picture = Picture(
+        np.clip(np.rint(base), 0, 255).astype(np.uint8),
+        background.depth.copy(),
+        np.full(background.depth.shape, BACKGROUND_ID, np.int32),
+    )
+    meshes = [
+        transform_points(homogeneous(camera_from_gv) @ pose, np.asarray(body.vertices, np.float64))
+        for body, pose in zip(bodies, gv_from_body, strict=True)
+    ]
+    window = _window(meshes, K, size)
+    if window is None:
+        return picture
+    fine, (rows, columns) = config.smoothing, window
+    fine_K = np.diag([fine, fine, 1.0]) @ _shifted(K, columns.start, rows.start)
+    fine_size = (columns.stop - columns.start) * fine, (rows.stop - rows.start) * fine
+    behind = background.depth[window] + background.thickness[window]
+    limit = np.where(background.depth[window] > 0, behind, np.inf)
+    limit = np.repeat(np.repeat(limit, fine, axis=0), fine, axis=1)
     depth = np.full(limit.shape, np.inf)
     ids = np.full(limit.shape, BACKGROUND_ID, np.int32)
     colour = np.zeros((*limit.shape, 3), np.float32)
-    for index, (body, pose) in enumerate(zip(bodies, gv_from_body, strict=True)):
-        camera_from_body = homogeneous(camera_from_gv) @ pose
-        vertices = transform_points(camera_from_body, np.asarray(body.vertices, np.float64))
-        raster = rasterise_mesh(vertices, body.faces, fine_K, (width * fine, height * fine))
+    for index, (body, vertices) in enumerate(zip(bodies, meshes, strict=True)):
+        raster = rasterise_mesh(vertices, body.faces, fine_K, fine_size)
         front = (raster.depth > 0) & (raster.depth < np.minimum(depth, limit))
         depth[front], ids[front] = raster.depth[front], index
         colour[front] = interpolate(raster, body.faces, body.vertex_rgb)[front]
-    return _flatten(background, depth, ids, colour, config)
+    _lay_over(picture, window, base[window], _MeshLayer(depth, ids, colour), fine)
+    return picture
 
 
 def world_camera(
@@ -75,32 +88,63 @@ def world_camera(
     return homogeneous(camera_from_world) @ invert_rigid(gv_from_world)
 
 
-def _flatten(
-    background: SplatRaster,
-    depth: Float[np.ndarray, "fh fw"],
-    ids: Int32[np.ndarray, "fh fw"],
-    colour: Float32[np.ndarray, "fh fw 3"],
-    config: Drawing,
-) -> Picture:
-    """Average the finer mesh layer over the background's pixels."""
-    height, width = background.depth.shape
-    fine = config.smoothing
+@dataclass(frozen=True)
+class _MeshLayer:
+    """Meshes drawn finer than the picture: depth (inf: none), body indices and colours."""
+
+    depth: Float[np.ndarray, "fh fw"]
+    ids: Int32[np.ndarray, "fh fw"]
+    rgb: Float32[np.ndarray, "fh fw 3"]
+
+
+def _window(
+    meshes: Sequence[Float[np.ndarray, "v 3"]],
+    K: Float[np.ndarray, "3 3"],
+    size: tuple[int, int],
+) -> tuple[slice, slice] | None:
+    """Return the rows and columns that the meshes may cover; None if they are not in view."""
+    width, height = size
+    points = np.concatenate(meshes) if meshes else np.zeros((0, 3))
+    if not (points[:, 2] > 0).any():
+        return None
+    if (points[:, 2] <= 0).any():
+        return slice(0, height), slice(0, width)
+    pixels = (points / points[:, 2:]) @ K[:2].T
+    low = np.clip(np.floor(pixels.min(axis=0)), 0, [width, height]).astype(int)
+    high = np.clip(np.ceil(pixels.max(axis=0)), 0, [width, height]).astype(int)
+    if (high <= low).any():
+        return None
+    return slice(int(low[1]), int(high[1])), slice(int(low[0]), int(high[0]))
+
+
+def _shifted(K: Float[np.ndarray, "3 3"], column: int, row: int) -> Float[np.ndarray, "3 3"]:
+    """Return the intrinsics of the part of a picture that begins at (column, row)."""
+    shifted = K.copy()
+    shifted[:2, 2] -= (column, row)
+    return shifted
+
+
+def _lay_over(
+    picture: Picture,
+    window: tuple[slice, slice],
+    base: Float32[np.ndarray, "h w 3"],
+    layer: _MeshLayer,
+    fine: int,
+) -> None:
+    """Average the finer mesh layer over the picture's pixels, in place."""
+    height, width, _ = base.shape
     cells = (height, fine, width, fine)
-    is_mesh = ids.reshape(cells) >= 0
-    cover = is_mesh.mean(axis=(1, 3), dtype=np.float32)[..., None]
-    mesh_rgb = colour.reshape(*cells, 3).mean(axis=(1, 3))
-    seen = background.depth > 0
-    base = np.where(seen[..., None], background.rgb, np.array(config.neutral, np.float32))
-    rgb = mesh_rgb + (1 - cover) * base
+    is_mesh = layer.ids.reshape(cells) >= 0
+    cover = is_mesh.mean(axis=(1, 3), dtype=np.float32)
+    rgb = layer.rgb.reshape(*cells, 3).mean(axis=(1, 3)) + (1 - cover[..., None]) * base
+    picture.rgb[window] = np.clip(np.rint(rgb), 0, 255).astype(np.uint8)
     # A pixel belongs to what covers most of it; of several bodies, to the nearest one.
-    fine_depth = np.moveaxis(depth.reshape(cells), 1, 2).reshape(height, width, fine * fine)
-    fine_ids = np.moveaxis(ids.reshape(cells), 1, 2).reshape(height, width, fine * fine)
+    fine_depth = np.moveaxis(layer.depth.reshape(cells), 1, 2).reshape(height, width, fine * fine)
+    fine_ids = np.moveaxis(layer.ids.reshape(cells), 1, 2).reshape(height, width, fine * fine)
     nearest = fine_depth.argmin(axis=2)[..., None]
-    body = np.take_along_axis(fine_ids, nearest, axis=2)[..., 0]
+    is_body = cover >= 0.5
     body_depth = np.take_along_axis(fine_depth, nearest, axis=2)[..., 0]
-    is_body = cover[..., 0] >= 0.5
-    return Picture(
-        np.clip(np.rint(rgb), 0, 255).astype(np.uint8),
-        np.where(is_body, body_depth, background.depth).astype(np.float32),
-        np.where(is_body, body, BACKGROUND_ID).astype(np.int32),
+    picture.depth[window] = np.where(is_body, body_depth, picture.depth[window])
+    picture.object_ids[window] = np.where(
+        is_body, np.take_along_axis(fine_ids, nearest, axis=2)[..., 0], BACKGROUND_ID
     )

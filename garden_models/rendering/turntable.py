@@ -77,15 +77,32 @@ def view_cloud(
     low, high = np.percentile(points_gv.xyz, [2, 98], axis=0)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     distance = config.margin * radius / np.tan(np.radians(config.field_of_view_deg) / 2)
-    eye = centre + distance * _direction(yaw_deg, elevation_deg)
+    camera = look_at(centre + distance * _direction(yaw_deg, elevation_deg), centre)
+    inner = ((points_gv.xyz >= low) & (points_gv.xyz <= high)).all(axis=1)
     splats = splat_points(
         points_gv,
-        look_at(eye, centre),
-        _intrinsics(config),
+        camera,
+        _fitted(points_gv.xyz[inner] if inner.any() else points_gv.xyz, camera, config),
         config.size,
         Splatting(near=max(1e-3, 0.2 * (distance - radius))),
     )
     return _on_backdrop(splats.rgb, splats.depth > 0, config)
+
+
+def _fitted(
+    points: Float[np.ndarray, "n 3"], camera: Float[np.ndarray, "3 4"], config: Turntable
+) -> Float[np.ndarray, "3 3"]:
+    """Return K, zoomed and shifted so that the points fill the picture."""
+    width, height = config.size
+    K = _intrinsics(config)
+    in_camera = transform_points(camera, points)
+    pixels = (in_camera / in_camera[:, 2:]) @ K[:2].T
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    extent = np.maximum(high - low, 1e-6)
+    zoom = float(min(width / extent[0], height / extent[1])) / config.margin
+    K[:2] *= zoom
+    K[:2, 2] += np.array([width, height]) / 2 - zoom * (low + high) / 2
+    return K
 
 
 def look_at(
