@@ -17,6 +17,7 @@ have holes where a print or a shadow looks like something else.
 from __future__ import annotations
 
 import numpy as np
+import trimesh
 from jaxtyping import Bool, Float, Int
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -25,7 +26,7 @@ from scipy.spatial import cKDTree
 from garden_models.disentanglement.config import GeometricRule
 from garden_models.disentanglement.mask_votes import Votes, mask_votes
 from garden_models.disentanglement.protocol import Crop, PlacedMesh
-from garden_models.disentanglement.signed_distance import signed_distance
+from garden_models.disentanglement.signed_distance import inside_mesh, signed_distance
 from garden_models.progress import Progress, silent
 from garden_models.scene import PointCloud, SupportSurface
 
@@ -40,7 +41,9 @@ def classify(
     if not len(points):
         return np.zeros(0)
     tolerance = config.spacings * points.spacing + config.mesh_noise * mesh.size
-    distance = signed_distance(points.xyz, mesh.vertices_gv, mesh.faces)
+    # Nothing below asks for distances beyond the ghosts' reach or three tolerances.
+    reach = max(config.ghost_reach * mesh.size, 3 * float(tolerance.max())) * 1.01
+    distance = signed_distance(points.xyz, mesh.vertices_gv, mesh.faces, reach)
     progress(0.5, "masks of all photos")
     votes = mask_votes(points, crop.views, config.depth_tolerance)
     masks = _mask_evidence(votes, config)
@@ -101,7 +104,7 @@ def _keep_support(
     above = points_gv.xyz[low].copy()
     # High enough to be clear of the mesh's own noise at its bottom.
     above[:, 1] = support.height_gv - thickness[low] - config.mesh_noise * mesh.size
-    under = signed_distance(above, mesh.vertices_gv, mesh.faces) < 0
+    under = inside_mesh(above, trimesh.Trimesh(mesh.vertices_gv, mesh.faces, process=False))
     under &= height[low] >= -2 * thickness[low]
     out = evidence.copy()
     out[low] = np.where(under, config.distance_weight, masks[low] - config.support_weight)

@@ -149,7 +149,7 @@ def _match_patches(origin: Origin, level: _Level, rounds: int, config: Inpaintin
     filled = level.texture[origin[..., 0], origin[..., 1]]
     patches = _patches(filled, sources, size)
     mean = patches.mean(axis=0)
-    some = patches[:: max(1, len(patches) // 2000)] - mean
+    some = patches[:: max(1, len(patches) // 1000)] - mean
     axes = np.linalg.eigh(some.T @ some)[1][:, -config.components :]
     contrast = float(np.sqrt(((patches - mean) ** 2).sum(axis=1).mean()))
     per_pixel = config.locality * contrast / max(level.known.shape)

@@ -57,8 +57,8 @@ def outer_polygon(filled: Bool[np.ndarray, "r c"], grid: Grid, simplify: float =
     """Return the outline of the largest connected region of cells, its holes filled.
 
     The polygon follows the cells' outer edges to within a quarter cell, is simplified to
-    within ``simplify`` cells (Douglas-Peucker) and has positive ``signed_area`` in the grid's
-    own axes.
+    within ``simplify`` cells (Douglas-Peucker) and has positive ``signed_area`` in the
+    grid's own axes.
     Raises ValueError if no cell is filled.
     """
     if not filled.any():
