@@ -1,11 +1,11 @@
-"""Write depth maps and masks as PNG."""
+"""Write depth maps, masks and colour pictures as PNG."""
 
 from __future__ import annotations
 
 import io
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, UInt8
 from PIL import Image
 
 DEPTH_UNIT_M = 0.001
@@ -22,6 +22,11 @@ def depth_png(depth: Float[np.ndarray, "h w"]) -> bytes:
 def mask_png(mask: Bool[np.ndarray, "h w"]) -> bytes:
     """Return a one-bit PNG."""
     return _png(Image.fromarray(mask))
+
+
+def rgb_png(rgb: UInt8[np.ndarray, "h w 3"]) -> bytes:
+    """Return a 24-bit PNG without a colour profile; the first row is the top."""
+    return _png(Image.fromarray(rgb))
 
 
 def _png(image: Image.Image) -> bytes:

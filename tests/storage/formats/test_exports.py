@@ -10,7 +10,7 @@ from PIL import Image
 
 from storage.formats.glb import GlbNode, scene_glb
 from storage.formats.ply import SH_C0, gaussians_ply, points_ply
-from storage.formats.png import depth_png, mask_png
+from storage.formats.png import depth_png, mask_png, rgb_png
 
 
 def test_points_ply_is_read_back_by_trimesh() -> None:
@@ -62,3 +62,10 @@ def test_depth_png_is_millimetres_with_zero_for_none() -> None:
 def test_mask_png_round_trip() -> None:
     mask = np.random.default_rng(0).random((9, 7)) > 0.5
     np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(mask_png(mask)))), mask)
+
+
+def test_rgb_png_keeps_every_value_and_the_top_row_on_top() -> None:
+    rgb = np.random.default_rng(0).integers(0, 256, (5, 7, 3)).astype(np.uint8)
+    image = Image.open(io.BytesIO(rgb_png(rgb)))
+    assert image.mode == "RGB"
+    np.testing.assert_array_equal(np.asarray(image), rgb)
