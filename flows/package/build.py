@@ -10,11 +10,11 @@ import numpy as np
 
 from flows.package.frames import GLTF_FROM_GV, ZUP_FROM_GV, frames_document
 from flows.package.licences import licences_document
+from flows.package.mujoco_files import mujoco_files
 from flows.report.document import Json, report_document
 from flows.report.page import report_page
 from flows.report.values import SceneValues
 from garden_models.geometry.rigid import transform_points
-from garden_models.physics.export_mjcf import mjcf_zup
 from garden_models.reconstruction.surfels import surfels
 from garden_models.scene import Background, SimScene
 from storage.formats.colmap import colmap_model
@@ -44,8 +44,7 @@ def package_files(values: SceneValues) -> tuple[dict[str, bytes], Json]:
     if values.background is not None:
         files |= _background_files(values.background)
     if values.scene is not None and values.trajectory is not None:
-        mjcf = mjcf_zup(values.scene, values.trajectory)
-        files |= {"scene.xml": mjcf.xml.encode(), **mjcf.asset_bytes}
+        files |= mujoco_files(values.scene, values.trajectory)
         files["scene.glb"] = _glb(values.scene, values.background)
     return files, document
 

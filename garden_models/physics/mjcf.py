@@ -1,7 +1,8 @@
 """Write bodies and supports as MJCF, the XML of MuJoCo, with mesh files beside it.
 
 One writer serves the simulation (in Gravity-View, gravity +y) and the export (z-up). Masses
-and inertias are explicit, so that no importer derives them from meshes. Options are those of
+and inertias are explicit, so that no importer derives them from meshes. MuJoCo knows no vertex
+colours: what is seen carries them as a texture. Options are those of
 the paper: time step 0.001 s, Newton, 50 iterations, pyramidal cone. Friction is the only
 contact parameter that is set; everything else is MuJoCo's default, and nothing is damped.
 """
@@ -14,9 +15,10 @@ from dataclasses import dataclass, field
 from xml.etree import ElementTree
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt8
 
 from garden_models.geometry.rotation import quaternion_from_matrix, rotation_between
+from garden_models.meshing.texture_atlas import MAX_FACES, bake_vertex_colours
 from garden_models.physics.config import GRAVITY, ITERATIONS, TIMESTEP
 from garden_models.physics.prism import support_prisms
 from garden_models.scene import Body, SupportSurface
@@ -32,14 +34,17 @@ SUPPORT_THICKNESS = 0.03
 
 @dataclass(frozen=True)
 class Mjcf:
-    """The XML text and the mesh files that it names (file name -> OBJ text)."""
+    """The XML text and the files that it names: meshes (file name -> OBJ text) and textures
+    (file name -> the picture that the PNG file of that name has to hold).
+    """
 
     xml: str
     assets: dict[str, str] = field(default_factory=dict)
+    textures: dict[str, UInt8[np.ndarray, "h w 3"]] = field(default_factory=dict)
 
     @property
     def asset_bytes(self) -> dict[str, bytes]:
-        """The files as MuJoCo's ``from_xml_string(xml, assets)`` wants them."""
+        """The meshes as MuJoCo's ``from_xml_string(xml, assets)`` wants them."""
         return {name: text.encode() for name, text in self.assets.items()}
 
 
@@ -56,9 +61,9 @@ def write_mjcf(
     """Return the model of a scene in the frame that a rotation leads to from Gravity-View.
 
     Bodies without a support (``supported_by`` empty) have no joint: they stay where they are.
-    ``mesh_prefix`` goes before every mesh file's name (a folder). ``visuals`` adds the full
-    meshes, which collide with nothing. ``keyframes`` maps a name to every body's
-    ``gv_from_body`` (fixed bodies too; theirs is left out).
+    ``mesh_prefix`` goes before every file's name (a folder). ``visuals`` adds the full meshes,
+    textured, which collide with nothing and weigh nothing, and a light. ``keyframes`` maps a
+    name to every body's ``gv_from_body`` (fixed bodies too; theirs is left out).
     """
     root = ElementTree.Element("mujoco", model=name)
     ElementTree.SubElement(root, "compiler", angle="radian", autolimits="true")
@@ -71,13 +76,15 @@ def write_mjcf(
         cone="pyramidal",
         gravity=_numbers(frame_from_gv @ np.array([0.0, GRAVITY, 0.0])),
     )
+    if visuals:
+        _add_light(root)
     asset = ElementTree.SubElement(root, "asset")
     world = ElementTree.SubElement(root, "worldbody")
-    meshes = _Meshes(asset, mesh_prefix, {})
+    assets = _Assets(asset, mesh_prefix)
     for support in supports:
-        _add_support(world, meshes, support, frame_from_gv)
+        _add_support(world, assets, support, frame_from_gv)
     for body in bodies:
-        _add_body(world, meshes, body, frame_from_gv, visuals=visuals)
+        _add_body(world, assets, body, frame_from_gv, visuals=visuals)
     if keyframes:
         keyframe = ElementTree.SubElement(root, "keyframe")
         for key, poses in keyframes.items():
@@ -90,26 +97,58 @@ def write_mjcf(
             ]
             ElementTree.SubElement(keyframe, "key", name=key, qpos=_numbers(qpos))
     ElementTree.indent(root)
-    return Mjcf(ElementTree.tostring(root, encoding="unicode"), meshes.files)
+    return Mjcf(ElementTree.tostring(root, encoding="unicode"), assets.meshes, assets.textures)
 
 
 @dataclass(frozen=True)
-class _Meshes:
+class _Assets:
     """The ``<asset>`` element and the files that it names."""
 
     element: ElementTree.Element
     prefix: str
-    files: dict[str, str]
+    meshes: dict[str, str] = field(default_factory=dict)
+    textures: dict[str, UInt8[np.ndarray, "h w 3"]] = field(default_factory=dict)
 
-    def add(self, name: str, vertices: np.ndarray, faces: np.ndarray) -> None:
-        """Name a mesh in the model and keep its file, whose name is safe and its own."""
-        stem = re.sub(r"[^A-Za-z0-9_-]+", "_", name)
-        file = f"{self.prefix}{stem}.obj"
-        while file in self.files:
+    def add_mesh(self, name: str, vertices: np.ndarray, faces: np.ndarray) -> None:
+        """Name a mesh in the model and keep its file."""
+        self._add_obj(name, obj_text(vertices, faces))
+
+    def add_textured_mesh(
+        self, name: str, vertices: np.ndarray, faces: np.ndarray, vertex_rgb: np.ndarray
+    ) -> None:
+        """Name a mesh, a texture and a material in the model and keep their files."""
+        atlas = bake_vertex_colours(faces, vertex_rgb)
+        picture = self._add_obj(name, obj_text(vertices, faces, atlas.corner_uv)) + ".png"
+        self.textures[picture] = atlas.rgb
+        ElementTree.SubElement(self.element, "texture", name=name, type="2d", file=picture)
+        # The colours already hold the highlights of the photographed room.
+        ElementTree.SubElement(
+            self.element, "material", name=name, texture=name, specular="0", shininess="0"
+        )
+
+    def _add_obj(self, name: str, text: str) -> str:
+        """Keep a mesh under a file name that is safe and its own; return it, less ``.obj``."""
+        stem = self.prefix + re.sub(r"[^A-Za-z0-9_-]+", "_", name)
+        while f"{stem}.obj" in self.meshes:
             stem += "_"
-            file = f"{self.prefix}{stem}.obj"
-        self.files[file] = obj_text(vertices, faces)
-        ElementTree.SubElement(self.element, "mesh", name=name, file=file)
+        self.meshes[f"{stem}.obj"] = text
+        ElementTree.SubElement(self.element, "mesh", name=name, file=f"{stem}.obj")
+        return stem
+
+
+def _add_light(root: ElementTree.Element) -> None:
+    """Light the scene from the viewer, so that what faces it has the colours of the photos.
+
+    They hold the room's light and shade already: a little more shade tells shapes apart.
+    """
+    visual = ElementTree.SubElement(root, "visual")
+    ElementTree.SubElement(
+        visual,
+        "headlight",
+        ambient=_numbers([0.6, 0.6, 0.6]),
+        diffuse=_numbers([0.4, 0.4, 0.4]),
+        specular=_numbers([0.0, 0.0, 0.0]),
+    )
 
 
 def is_free(body: Body) -> bool:
@@ -117,16 +156,29 @@ def is_free(body: Body) -> bool:
     return bool(body.supported_by)
 
 
-def obj_text(vertices: Float[np.ndarray, "v 3"], faces: Int[np.ndarray, "f 3"]) -> str:
-    """Return a mesh as Wavefront OBJ."""
+def obj_text(
+    vertices: Float[np.ndarray, "v 3"],
+    faces: Int[np.ndarray, "f 3"],
+    corner_uv: Float[np.ndarray, "f 3 2"] | None = None,
+) -> str:
+    """Return a mesh as Wavefront OBJ, with texture coordinates (u right, v up) if given."""
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices.tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (np.asarray(faces) + 1).tolist()]
+    numbers = (np.asarray(faces) + 1).tolist()
+    if corner_uv is None:
+        lines += [f"f {a} {b} {c}" for a, b, c in numbers]
+    else:
+        # Five decimals err by a hundredth of a texel in the largest texture.
+        lines += [f"vt {u:.5f} {v:.5f}" for u, v in corner_uv.reshape(-1, 2).tolist()]
+        lines += [
+            f"f {a}/{3 * i + 1} {b}/{3 * i + 2} {c}/{3 * i + 3}"
+            for i, (a, b, c) in enumerate(numbers)
+        ]
     return "\n".join(lines) + "\n"
 
 
 def _add_support(
     world: ElementTree.Element,
-    meshes: _Meshes,
+    assets: _Assets,
     support: SupportSurface,
     frame_from_gv: Float[np.ndarray, "3 3"],
 ) -> None:
@@ -152,7 +204,7 @@ def _add_support(
     prisms = support_prisms(support.outline_gv, support.height_gv, SUPPORT_THICKNESS)
     for i, prism in enumerate(prisms):
         mesh_name = support.name if len(prisms) == 1 else f"{support.name}_{i}"
-        meshes.add(mesh_name, prism.vertices @ frame_from_gv.T, prism.faces)
+        assets.add_mesh(mesh_name, prism.vertices @ frame_from_gv.T, prism.faces)
         ElementTree.SubElement(
             world,
             "geom",
@@ -166,7 +218,7 @@ def _add_support(
 
 def _add_body(
     world: ElementTree.Element,
-    meshes: _Meshes,
+    assets: _Assets,
     body: Body,
     frame_from_gv: Float[np.ndarray, "3 3"],
     *,
@@ -189,7 +241,7 @@ def _add_body(
     )
     for i, piece in enumerate(body.colliders):
         mesh_name = f"{body.name}_collider_{i}"
-        meshes.add(mesh_name, piece.vertices, piece.faces)
+        assets.add_mesh(mesh_name, piece.vertices, piece.faces)
         ElementTree.SubElement(
             element,
             "geom",
@@ -200,20 +252,32 @@ def _add_body(
             group="3",
         )
     if visuals:
-        meshes.add(f"{body.name}_visual", body.vertices, body.faces)
+        _add_visual(element, assets, body)
+
+
+def _add_visual(element: ElementTree.Element, assets: _Assets, body: Body) -> None:
+    """Add a body's mesh, textured with its vertex colours; in one colour if it has none, or too
+    many faces for a texture.
+    """
+    name = f"{body.name}_visual"
+    geom = ElementTree.SubElement(
+        element,
+        "geom",
+        name=name,
+        type="mesh",
+        mesh=name,
+        contype="0",
+        conaffinity="0",
+        mass="0",
+        group="2",
+    )
+    if len(body.vertex_rgb) and 0 < len(body.faces) <= MAX_FACES:
+        assets.add_textured_mesh(name, body.vertices, body.faces, body.vertex_rgb)
+        geom.set("material", name)
+    else:
+        assets.add_mesh(name, body.vertices, body.faces)
         colour = body.vertex_rgb.mean(axis=0) / 255 if len(body.vertex_rgb) else np.full(3, 0.5)
-        ElementTree.SubElement(
-            element,
-            "geom",
-            name=f"{body.name}_visual",
-            type="mesh",
-            mesh=f"{body.name}_visual",
-            contype="0",
-            conaffinity="0",
-            mass="0",
-            group="2",
-            rgba=_numbers([*colour, 1.0]),
-        )
+        geom.set("rgba", _numbers([*colour, 1.0]))
 
 
 def _pose(

@@ -14,7 +14,13 @@ from garden_models.physics.config import Simulation
 from garden_models.physics.export_mjcf import mjcf_zup
 from garden_models.physics.mjcf import ZUP_FROM_GV, write_mjcf
 from garden_models.physics.simulate import simulate
+from storage.formats.png import rgb_png
 from tests.garden_models.physics import room
+
+
+def load(mjcf):
+    pictures = {name: rgb_png(rgb) for name, rgb in mjcf.textures.items()}
+    return mujoco.MjModel.from_xml_string(mjcf.xml, mjcf.asset_bytes | pictures)
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +41,7 @@ def scene():
 def test_it_loads_and_rests_upright(scene):
     trajectory = simulate(scene, Simulation(seconds=1))
     mjcf = mjcf_zup(scene, trajectory)
-    model = mujoco.MjModel.from_xml_string(mjcf.xml, mjcf.asset_bytes)
+    model = load(mjcf)
     data = mujoco.MjData(model)
     np.testing.assert_allclose(model.opt.gravity, [0, 0, -9.81])
     assert model.opt.timestep == 0.001
@@ -58,7 +64,7 @@ def test_it_loads_and_rests_upright(scene):
 def test_mass_and_inertia_are_explicit(scene):
     mjcf = mjcf_zup(scene)
     assert mjcf.xml.count("<inertial") == len(scene.bodies)
-    model = mujoco.MjModel.from_xml_string(mjcf.xml, mjcf.asset_bytes)
+    model = load(mjcf)
     for body in scene.bodies:
         compiled = model.body(body.name)
         assert compiled.mass[0] == pytest.approx(body.mass_kg, rel=1e-6)
@@ -70,7 +76,8 @@ def test_mass_and_inertia_are_explicit(scene):
 def test_files_are_named_as_asked_and_all_there(scene):
     mjcf = mjcf_zup(scene, mesh_prefix="meshes/")
     assert mjcf.assets
-    for name in mjcf.assets:
+    assert len(mjcf.textures) == len(scene.bodies)
+    for name in mjcf.assets | mjcf.textures:
         assert name.startswith("meshes/")
         assert f'file="{name}"' in mjcf.xml
 
@@ -79,7 +86,7 @@ def test_gravity_view_and_zup_are_the_same_physics(scene):
     ends = []
     for frame in (np.eye(3), ZUP_FROM_GV):
         mjcf = write_mjcf(scene.bodies, scene.supports, frame)
-        model = mujoco.MjModel.from_xml_string(mjcf.xml, mjcf.asset_bytes)
+        model = load(mjcf)
         data = mujoco.MjData(model)
         mujoco.mj_step(model, data, nstep=1000)
         ends.append(data.xpos @ frame)
@@ -91,6 +98,31 @@ def test_names_of_objects_make_safe_file_names(scene):
     renamed = replace(scene, bodies=tuple(named))
     mjcf = mjcf_zup(renamed)
     assert len(mjcf.assets) == len(mjcf_zup(scene).assets)
+    assert len(mjcf.textures) == len(mjcf_zup(scene).textures)
     assert all(re.fullmatch(r"assets/[A-Za-z0-9_-]+\.obj", name) for name in mjcf.assets)
-    model = mujoco.MjModel.from_xml_string(mjcf.xml, mjcf.asset_bytes)
+    assert all(re.fullmatch(r"assets/[A-Za-z0-9_-]+\.png", name) for name in mjcf.textures)
+    model = load(mjcf)
     assert model.body("../0 é").id > 0
+
+
+def test_what_is_seen_adds_nothing_to_the_physics(scene):
+    plain, seen = (
+        load(write_mjcf(scene.bodies, scene.supports, ZUP_FROM_GV, visuals=visuals))
+        for visuals in (False, True)
+    )
+    np.testing.assert_array_equal(seen.body_mass, plain.body_mass)
+    np.testing.assert_array_equal(seen.body_inertia, plain.body_inertia)
+    collides = (seen.geom_contype != 0) | (seen.geom_conaffinity != 0)
+    assert collides.sum() == plain.ngeom
+    assert seen.ngeom == plain.ngeom + len(scene.bodies)
+    assert (seen.geom_matid[collides] == -1).all()
+    assert (seen.geom_group[~collides] == 2).all()
+    for name in ("geom_pos", "geom_quat", "geom_size", "geom_friction", "geom_rgba"):
+        np.testing.assert_array_equal(getattr(seen, name)[collides], getattr(plain, name))
+
+
+def test_a_body_without_colours_is_grey(scene):
+    bare = replace(scene.bodies[0], vertex_rgb=np.zeros((0, 3), np.uint8))
+    model = load(mjcf_zup(replace(scene, bodies=(bare,))))
+    assert model.ntex == 0
+    np.testing.assert_allclose(model.geom(f"{bare.name}_visual").rgba, [0.5, 0.5, 0.5, 1.0])
