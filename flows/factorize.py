@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from functools import partial
 
 from flows.preset import Preset
-from garden_models.scene import Target
+from garden_models.scene import Rivals, Target
 from tasks.align_gravity import align_gravity
 from tasks.clean_background import clean_background
 from tasks.compose import compose
+from tasks.find_rivals import find_rivals
 from tasks.ingest import CaptureSource, ingest
 from tasks.label_points import label_points
 from tasks.mesh_object import mesh_object
@@ -101,18 +102,18 @@ def factorize_scene(
 def factor_object(target: Target, refs: SceneRefs, preset: Preset) -> FactoredObject:
     """Take one target out of the scene: mask, mesh, pose, and its points."""
     scene = refs.reconstruction, refs.gravity_view
-    masks = segment(*scene, target, rivals_of(target, refs.targets), preset.segment)
+    others = possible_rivals(target, refs.targets)
+    rivals = find_rivals(*scene, target, others, preset.segment) if others else Rivals()
+    masks = segment(*scene, target, rivals, preset.segment)
     mesh = mesh_object(*scene, masks, preset.mesh)
     placement = place_object(*scene, masks, mesh, preset.place)
     labels = label_points(*scene, masks, mesh, placement, preset.disentangle)
     return FactoredObject(target, masks, mesh, placement, labels)
 
 
-def rivals_of(target: Target, targets: tuple[Target, ...]) -> tuple[Target, ...]:
-    """Return the other targets whose boxes could claim the same points.
-
-    Boxes in the same photo are rivals if they overlap; boxes in different photos cannot
-    be compared before there is geometry, so they all count.
+def possible_rivals(target: Target, targets: tuple[Target, ...]) -> tuple[Target, ...]:
+    """Return the other targets whose boxes could hold the same points: all but those of
+    the same photo whose boxes lie apart from the target's.
     """
 
     def apart(other: Target) -> bool:

@@ -250,6 +250,14 @@ class Target:
 
 
 @dataclass(frozen=True)
+class Rivals:
+    """The targets whose boxes hold some of the points that lie in one target's box."""
+
+    SCHEMA: ClassVar[str] = "garden.Rivals/1"
+    targets: tuple[Target, ...] = ()
+
+
+@dataclass(frozen=True)
 class SupportSurface:
     """A horizontal surface that can carry things, in GV.
 

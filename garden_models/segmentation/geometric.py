@@ -11,13 +11,14 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32
 from scipy.spatial import cKDTree
 
-from garden_models.geometry.rigid import homogeneous, invert_rigid, transform_points
+from garden_models.geometry.rigid import invert_rigid
 from garden_models.progress import Progress, silent
 from garden_models.scene import (
     GravityView,
     ObjectMasks,
     PointCloud,
     Reconstruction,
+    Rivals,
     Target,
     View,
 )
@@ -34,6 +35,7 @@ from garden_models.segmentation.node_labels import (
 )
 from garden_models.segmentation.occlusion import compare_outline
 from garden_models.segmentation.region import BoxView, box_evidence, boxes_and_nodes
+from garden_models.segmentation.scene_in_gv import SceneInGV, scene_in_gv
 from garden_models.segmentation.support import support_of
 from garden_models.segmentation.tidy import tidy_mask
 from garden_models.segmentation.verdict import judge
@@ -43,15 +45,6 @@ from garden_models.segmentation.view_masks import (
     open_window,
     votes_of_views,
 )
-
-
-@dataclass(frozen=True)
-class _Scene:
-    """A reconstruction in Gravity-View: fused points, and each view's camera_from_gv."""
-
-    reconstruction: Reconstruction
-    cloud: PointCloud
-    cameras: tuple[Float[np.ndarray, "4 4"], ...]
 
 
 @dataclass(frozen=True)
@@ -66,28 +59,27 @@ class _Refined:
 
 
 DEFAULT = Segment()
+NO_RIVALS = Rivals()
 
 
 def segment(
     reconstruction: Reconstruction,
     gravity_view: GravityView,
     target: Target,
-    rivals: tuple[Target, ...] = (),
+    rivals: Rivals = NO_RIVALS,
     config: Segment = DEFAULT,
     progress: Progress = silent,
 ) -> ObjectMasks:
     """Return the target's mask in every view, its own fused points, and its support.
 
-    ``rivals`` are other targets whose boxes may touch this one: what lies in both boxes is
-    divided between them. Raises BadInput if the box's photo is not registered or the box
-    is outside of it, BadGeometry if nothing was reconstructed in the box. The verdict is
-    degraded, with the reason, where the evidence is weak.
+    What lies in the target's box and a rival's is divided between them. Raises BadInput if
+    the photo of a box is not registered or a box is outside of it, BadGeometry if nothing
+    was reconstructed in one. The verdict is degraded, with the reason, where the evidence
+    is weak.
     """
     progress(0.0, "collecting points around the box")
-    scene = _in_gv(reconstruction, gravity_view)
-    boxes, nodes = boxes_and_nodes(
-        reconstruction, scene.cloud, scene.cameras, target, rivals, config
-    )
+    scene = scene_in_gv(reconstruction, gravity_view)
+    boxes, nodes = boxes_and_nodes(scene, (target, *rivals.targets), config)
     graph = node_graph(
         nodes,
         reach=config.reach,
@@ -112,9 +104,7 @@ def segment(
     if carrier is not None:
         centres = np.stack([invert_rigid(camera)[:3, 3] for camera in scene.cameras])
         support = support_of(target.name, carrier, graph.cloud, scene.cloud, centres)
-    verdict = judge(
-        target, boxes[0].box, masks, len(points), outlined, support, refined.labels[:, 1]
-    )
+    verdict = judge(target, boxes[0], masks, points.xyz, outlined, support, refined.labels[:, 1])
     progress(1.0, "done")
     return ObjectMasks(
         target,
@@ -125,24 +115,6 @@ def segment(
         support,
         verdict,
     )
-
-
-def _in_gv(reconstruction: Reconstruction, gravity_view: GravityView) -> _Scene:
-    """Turn points, normals and cameras to Gravity-View."""
-    gv_from_world = gravity_view.gv_from_world
-    points = reconstruction.points_world
-    cloud = PointCloud(
-        transform_points(gv_from_world, points.xyz),
-        points.rgb,
-        points.normal @ gv_from_world[:3, :3].T,
-        points.spacing,
-        points.confidence,
-    )
-    world_from_gv = invert_rigid(gv_from_world)
-    cameras = tuple(
-        homogeneous(view.camera_from_world) @ world_from_gv for view in reconstruction.views
-    )
-    return _Scene(reconstruction, cloud, cameras)
 
 
 def _candidate(graph: NodeGraph, one: BoxView, config: Segment) -> Candidate:
@@ -166,7 +138,7 @@ def _candidate(graph: NodeGraph, one: BoxView, config: Segment) -> Candidate:
 
 
 def _refined(
-    scene: _Scene,
+    scene: SceneInGV,
     box: BoxView,
     graph: NodeGraph,
     candidates: tuple[Candidate, ...],
@@ -211,7 +183,7 @@ def _silhouette(
 
 
 def _hull(
-    scene: _Scene,
+    scene: SceneInGV,
     graph: NodeGraph,
     carrier: Carrier | None,
     labels: Probabilities,
@@ -250,7 +222,7 @@ def _masks(views: tuple[View, ...], refined: _Refined) -> Iterator[Bool[np.ndarr
 
 
 def _own_points(
-    scene: _Scene, graph: NodeGraph, candidate: Candidate, refined: _Refined
+    scene: SceneInGV, graph: NodeGraph, candidate: Candidate, refined: _Refined
 ) -> PointCloud:
     """Return the fused points whose nearest node is the target's.
 

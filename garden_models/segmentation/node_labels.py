@@ -27,13 +27,14 @@ ISOLATED = 0.3
 """A node of a connected core that nothing joins to what is outside of the box."""
 COLOUR = 0.1
 """A node's colour, where the labels' colours differ fully."""
-INSIDE = 0.03
-"""All nodes inside a box and above its support, together, in units of a cut across them:
-a thing that goes on outside of the box through more than a tenth of its width is not the
-target, however much of it is inside.
-"""
 CENTRE = 0.2
-"""The same for the very middle of the box, as if all nodes were there."""
+"""The nodes in the middle of a box that its view sees, as if all nodes inside and above the
+support were such, together, in units of a cut across them.
+"""
+RIM = 0.03
+"""The same for the nodes far from the middle or hidden from the box's view, towards the
+background: what goes on behind or beside the target is not drawn along with it.
+"""
 LEAK = 0.3
 """A core leaks when its joints to the outside reach this share of a cut across it."""
 RISES = 3.0
@@ -76,18 +77,20 @@ def label_nodes(
     """Return each node's probabilities: column 0 background, then one a candidate.
 
     A node outside of a target's box, or on or below what carries it, is not its. The rest
-    is a random walk: from what is inside of each box, most of all in its middle, from what
-    is background, from the labels' colours, and from the ``votes`` of the views on the
-    first candidate; ``before`` is then the last round's result.
+    is a random walk: from the middle of each box, from its rim and what is background, from
+    the labels' colours, and from the ``votes`` of the views on the first candidate;
+    ``before`` is then the last round's result.
     """
     open_to, grip = _claims(graph, candidates)
     weights = _above_support(graph, candidates)
     contested = open_to[:, 1:].sum(1)
     draws = np.zeros(open_to.shape)
+    rims = np.full(open_to.shape, np.inf)
     for k, candidate in enumerate(candidates, 1):
         others = [other for other in candidates if other is not candidate]
         alone = isolation(graph, weights, candidate, others)
-        draws[:, k] = _draw(candidate, open_to[:, k], alone * (1 - grip))
+        draws[:, k], rims[:, k] = _draws(candidate, open_to[:, k], alone * (1 - grip))
+    draws[:, 0] = np.where(contested > 0, rims.min(1), 0.0)
     bins = colour_bins(lab_colours(graph.cloud.rgb))
     result = before
     for _ in range(COLOUR_ROUNDS + (before is None)):
@@ -214,18 +217,19 @@ def nearness(
     return np.where(core, 1.0, 0.8 * np.exp(-((distance / reach) ** 2)))
 
 
-def _draw(
+def _draws(
     candidate: Candidate, claimed: Bool[np.ndarray, " n"], alone: Float[np.ndarray, " n"]
-) -> Float[np.ndarray, " n"]:
-    """Return how strongly a candidate draws the nodes that it claims.
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return how strongly a candidate draws the nodes that it claims, and how strongly the
+    background does (infinite for nodes that it does not claim).
 
     ``alone`` (0..1) says how isolated the core is, and that a node is not of the support.
     """
     # Counted over a surface of n nodes, a cut across it meets about sqrt(n) of them.
     weak = 1.0 / math.sqrt(max(int(np.count_nonzero(claimed)), 1))
     middle = candidate.near * candidate.centrality * candidate.evidence.seen
-    claim = weak * (INSIDE + CENTRE * middle) + ISOLATED * candidate.core * alone
-    return claimed * claim
+    claim = weak * CENTRE * middle + ISOLATED * candidate.core * alone
+    return claimed * claim, np.where(claimed, weak * RIM * (1 - middle), np.inf)
 
 
 def _vote(
@@ -248,12 +252,12 @@ def _colour_evidence(
 ) -> tuple[Probabilities, Float[np.ndarray, " n"]]:
     """Return what the nodes' colours say of their labels, and how surely (0..1).
 
-    Targets are as likely as they are large, all together as likely as the background.
+    All targets are as likely, however large they are, and together as the background: by
+    its size alone a large one would take a small one's colours.
     """
     counts = colour_counts(bins, labels * area[:, None])
-    sizes = counts.sum(1)
-    sizes[0] = sizes[1:].sum()
-    colour = colour_posterior(counts, sizes / max(float(sizes.sum()), 1e-12))[bins]
     count = labels.shape[1]
+    prior = np.array([0.5] + [0.5 / (count - 1)] * (count - 1))
+    colour = colour_posterior(counts, prior)[bins]
     best: Float[np.ndarray, " n"] = colour.max(axis=1)
     return colour, ((count * best - 1) / (count - 1)).clip(0, 1) ** 2

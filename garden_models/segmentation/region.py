@@ -8,10 +8,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy import ndimage
 
-from garden_models.scene import BadGeometry, PointCloud, Reconstruction, Target, View
+from garden_models.scene import BadGeometry, PointCloud, Target, View
 from garden_models.segmentation.box import ViewBox, box_in_view
 from garden_models.segmentation.carrier import BoxEvidence
 from garden_models.segmentation.config import Segment
+from garden_models.segmentation.scene_in_gv import SceneInGV
 from garden_models.segmentation.zbuffer import Projection, front_points, project_points
 
 FRONT = 0.3
@@ -54,39 +55,24 @@ class BoxView:
 
 
 def boxes_and_nodes(
-    reconstruction: Reconstruction,
-    cloud: PointCloud,
-    cameras: tuple[Float[np.ndarray, "4 4"], ...],
-    target: Target,
-    rivals: tuple[Target, ...],
-    config: Segment,
+    scene: SceneInGV, targets: tuple[Target, ...], config: Segment
 ) -> tuple[tuple[BoxView, ...], PointCloud]:
-    """Return the target's box, then those of the rivals that some of its points lie in, and
-    the points around all of them; more than ``max_nodes`` are thinned evenly.
+    """Return the targets' boxes and the points around all of them, thinned evenly if they
+    are more than ``max_nodes``.
     """
-    registered = {view.photo for view in reconstruction.views}
-    boxes: list[BoxView] = []
-    around: list[Int[np.ndarray, " m"]] = []
-    # A rival on a photo that is not registered has its own verdict; here it says nothing.
-    for one in (target, *(rival for rival in rivals if rival.photo in registered)):
-        box = box_in_view(one, reconstruction)
-        view = BoxView(one, box, reconstruction.views[box.view], cameras[box.view])
-        if boxes and not _overlap(cloud, around[0], boxes[0], view, config.box_margin):
-            continue
-        index = points_around(
-            cloud,
-            view,
-            surroundings=config.surroundings,
-            before=config.depth_before,
-            behind=config.depth_behind,
-        )
-        boxes.append(view)
-        around.append(index)
-    return tuple(boxes), _nodes(cloud, boxes, np.unique(np.concatenate(around)), config)
+    boxes = tuple(box_view(scene, target) for target in targets)
+    around = [points_around(scene.cloud, box, config) for box in boxes]
+    return boxes, _nodes(scene.cloud, boxes, np.unique(np.concatenate(around)), config)
+
+
+def box_view(scene: SceneInGV, target: Target) -> BoxView:
+    """Return the target's box on its view; BadInput if it is not on a registered photo."""
+    box = box_in_view(target, scene.reconstruction)
+    return BoxView(target, box, scene.reconstruction.views[box.view], scene.cameras[box.view])
 
 
 def _nodes(
-    cloud: PointCloud, boxes: list[BoxView], around: Int[np.ndarray, " m"], config: Segment
+    cloud: PointCloud, boxes: tuple[BoxView, ...], around: Int[np.ndarray, " m"], config: Segment
 ) -> PointCloud:
     """Return the points around the boxes, thinned evenly to ``max_nodes``: those in a box
     least, so that two thirds of the nodes, if there are as many points, are in boxes.
@@ -110,20 +96,10 @@ def _nodes(
     )
 
 
-def _overlap(
-    cloud: PointCloud, around: Int[np.ndarray, " m"], own: BoxView, other: BoxView, margin: float
-) -> bool:
-    """Tell whether more than a hundredth of the points in one box lie in another's as well."""
-    xyz = cloud.xyz[around]
-    xyz = xyz[own.inside(own.project(xyz), margin)]
-    return bool(other.inside(other.project(xyz), margin).sum() > 0.01 * len(xyz))
-
-
-def points_around(
-    cloud: PointCloud, one: BoxView, *, surroundings: float, before: float, behind: float
-) -> Int[np.ndarray, " m"]:
+def points_around(cloud: PointCloud, one: BoxView, config: Segment) -> Int[np.ndarray, " m"]:
     """Return the indices of the points in the box grown by ``surroundings`` boxes, from
-    ``before`` to ``behind`` box diagonals (in metres at its depth) around its front content.
+    ``depth_before`` to ``depth_behind`` box diagonals (in metres at its depth) around its
+    front content.
 
     Raises BadGeometry if no point is seen in the box.
     """
@@ -141,8 +117,9 @@ def points_around(
     total = np.cumsum(weight[order])
     middle = z[order][min(int(np.searchsorted(total, FRONT * total[-1])), len(z) - 1)]
     diagonal = float(np.linalg.norm(one.box.size)) * middle / float(one.view.K[0, 0])
-    keep = one.inside(seen, 2 * surroundings)
-    keep &= (seen.z > middle - before * diagonal) & (seen.z < middle + behind * diagonal)
+    keep = one.inside(seen, 2 * config.surroundings)
+    keep &= seen.z > middle - config.depth_before * diagonal
+    keep &= seen.z < middle + config.depth_behind * diagonal
     return np.flatnonzero(keep)
 
 

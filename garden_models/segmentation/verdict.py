@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float
 from garden_models.scene import SupportSurface, Target, Verdict
 from garden_models.segmentation.box import ViewBox
 from garden_models.segmentation.occlusion import Outlined
+from garden_models.segmentation.region import BoxView
 
 FEW_POINTS = 150
 """Fewer points than this do not make a mesh."""
@@ -18,6 +19,8 @@ CUT_BORDER = 0.1
 """A mask that covers more of the box's border than this is cut off by it."""
 UNSURE = 0.25
 """Share of the object's points with a probability near one half that makes it doubtful."""
+DEEP = 2.0
+"""A target that reaches this many diagonals of its box back may hold what lies behind it."""
 AGREEMENT = 0.6
 """Mean overlap of masks and projected points under which the views disagree."""
 
@@ -26,19 +29,19 @@ Masks = tuple[Bool[np.ndarray, "h w"], ...]
 
 def judge(
     target: Target,
-    box: ViewBox,
+    box_view: BoxView,
     masks: Masks,
-    points: int,
+    points_gv: Float[np.ndarray, "p 3"],
     outlined: list[Outlined],
     support: SupportSurface | None,
     probability: Float[np.ndarray, " n"],
 ) -> Verdict:
     """Return ok, or degraded with every reason that holds.
 
-    ``points`` is how many points the object has, ``probability`` that of all nodes near it.
+    ``points_gv`` are the object's points, ``probability`` that of all nodes near it.
     """
     reasons = []
-    name = target.name
+    name, box, points = target.name, box_view.box, len(points_gv)
     if support is None:
         reasons.append(
             f"Nothing carries {name!r}: no level surface touches it from below, so it may hang "
@@ -64,6 +67,12 @@ def judge(
             f"The box of {name!r} may cut the object off: {cut:.0%} of the box's border lies on "
             "it; draw a box that holds all of it."
         )
+    depth = _depth(points_gv, box_view)
+    if depth > DEEP:
+        reasons.append(
+            f"{name!r} reaches {depth:.1f} diagonals of its box into the picture: some of what "
+            "lies behind it may have been taken for it; a box on a photo from the side would tell."
+        )
     near = probability[probability > 0.3]
     unsure = float(np.mean(near < 0.6)) if len(near) else 0.0
     if unsure > UNSURE:
@@ -78,6 +87,15 @@ def judge(
             f"The masks of {name!r} agree with its points by only {agreement:.0%} on average."
         )
     return Verdict("degraded" if reasons else "ok", tuple(reasons))
+
+
+def _depth(points_gv: Float[np.ndarray, "p 3"], one: BoxView) -> float:
+    """Return the points' extent along the view in diagonals of the box at their depth."""
+    if len(points_gv) == 0:
+        return 0.0
+    near, middle, far = np.percentile(one.project(points_gv).z, [2, 50, 98])
+    diagonal = float(np.linalg.norm(one.box.size)) * middle / float(one.view.K[0, 0])
+    return float(far - near) / max(diagonal, 1e-12)
 
 
 def _border_share(mask: Bool[np.ndarray, "h w"], box: ViewBox) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flows.factorize import rivals_of
+from flows.factorize import possible_rivals
 from garden_models.scene import Target
 
 MUG = Target("mug", "a.jpg", (0, 0, 10, 10))
@@ -12,19 +12,19 @@ ELSEWHERE = Target("duck", "b.jpg", (30, 0, 40, 10))
 
 
 def test_overlapping_boxes_of_one_photo_are_rivals() -> None:
-    assert rivals_of(MUG, (MUG, TOUCHING, APART)) == (TOUCHING,)
+    assert possible_rivals(MUG, (MUG, TOUCHING, APART)) == (TOUCHING,)
 
 
 def test_boxes_apart_in_one_photo_do_not_depend_on_each_other() -> None:
-    assert rivals_of(APART, (MUG, TOUCHING, APART)) == ()
+    assert possible_rivals(APART, (MUG, TOUCHING, APART)) == ()
 
 
 def test_boxes_in_different_photos_may_be_of_the_same_points() -> None:
-    assert rivals_of(MUG, (MUG, ELSEWHERE)) == (ELSEWHERE,)
+    assert possible_rivals(MUG, (MUG, ELSEWHERE)) == (ELSEWHERE,)
 
 
 def test_rivalry_is_mutual() -> None:
     targets = (MUG, TOUCHING, APART, ELSEWHERE)
     for a in targets:
         for b in targets:
-            assert (b in rivals_of(a, targets)) == (a in rivals_of(b, targets))
+            assert (b in possible_rivals(a, targets)) == (a in possible_rivals(b, targets))
