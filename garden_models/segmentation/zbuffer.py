@@ -74,5 +74,5 @@ def front_points(
     front = np.full(nowhere + 1, -1)
     front[slots.ravel()] = np.repeat(index, len(offset))
     picture = front[:-1].reshape(height + 2 * most, wide)[most : most + height, most : most + width]
-    z = np.where(picture >= 0, seen.z[picture], np.inf)
+    z = np.append(seen.z, np.inf)[picture]
     return FrontPoints(np.ascontiguousarray(picture), z)
