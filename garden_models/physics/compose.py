@@ -13,6 +13,7 @@ from garden_models.physics.body import make_body
 from garden_models.physics.config import Compose
 from garden_models.physics.levelling import noise_m
 from garden_models.physics.merge_supports import merge_supports
+from garden_models.physics.mujoco_warnings import collect_warnings
 from garden_models.physics.separate import separate
 from garden_models.physics.support_surfaces import find_support_surfaces
 from garden_models.physics.trimming import deep_contacts_gv, trim_overlaps
@@ -71,9 +72,12 @@ def compose(
     supports, carriers = merge_supports(
         found, tuple(m.support for m in masks), names, placed, config.merge
     )
-    bodies, verdict = _bodies(meshes, placements, carriers, supports, config, progress)
-    progress(len(meshes) / (len(meshes) + 1), "moving overlapping bodies apart")
-    apart = _apart(bodies, supports, config)
+    with collect_warnings() as warned:
+        bodies, verdict = _bodies(meshes, placements, carriers, supports, config, progress)
+        progress(len(meshes) / (len(meshes) + 1), "moving overlapping bodies apart")
+        apart = _apart(bodies, supports, config)
+    if warned.reasons:
+        verdict = verdict.worst(Verdict("degraded", warned.reasons))
     for body in apart:
         verdict = verdict.worst(body.verdict)
     if scale.source in ("unknown", "prior"):

@@ -16,6 +16,7 @@ from jaxtyping import Float
 from garden_models.geometry.rotation import quaternion_from_matrix
 from garden_models.physics.config import Separation
 from garden_models.physics.mjcf import is_free, write_mjcf
+from garden_models.physics.mujoco_warnings import collect_warnings
 from garden_models.scene import Body, SupportSurface
 
 Vector3 = Float[np.ndarray, "3"]
@@ -32,6 +33,7 @@ class Overlap:
     depth: float
 
 
+@collect_warnings()
 def separate(
     bodies: tuple[Body, ...],
     supports: tuple[SupportSurface, ...],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 from jaxtyping import Float
@@ -9,11 +11,20 @@ from jaxtyping import Float
 from garden_models.geometry.rotation import angle_between_deg, matrix_from_quaternion
 from garden_models.physics.config import TIMESTEP, Simulation
 from garden_models.physics.mjcf import is_free, write_mjcf
+from garden_models.physics.mujoco_warnings import collect_warnings
 from garden_models.physics.poses import body_poses
 from garden_models.progress import Progress, silent
 from garden_models.scene import OK, Body, BodyMotion, SimScene, Trajectory, Verdict
 
+UNSTABLE = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+)
+"""What MuJoCo warns of when it resets a state that is no state any more."""
 
+
+@collect_warnings()
 def compile_scene(scene: SimScene) -> mujoco.MjModel:
     """Return the MuJoCo model of a scene in Gravity-View (gravity +y)."""
     mjcf = write_mjcf(scene.bodies, scene.supports, np.eye(3))
@@ -27,9 +38,20 @@ def simulate(
 ) -> Trajectory:
     """Simulate and return poses, motions and a verdict.
 
-    The first frame is the start. A body that tilts, drifts or falls is ``degraded``; a
-    simulation that diverges is ``failed`` and its trajectory ends there.
+    The first frame is the start. A body that tilts, drifts or falls is ``degraded``, as is a
+    simulation that MuJoCo warns of; one that diverges is ``failed`` and its trajectory ends
+    there.
     """
+    with collect_warnings() as warned:
+        trajectory = _simulate(scene, config, progress)
+    if not warned.reasons:
+        return trajectory
+    verdict = trajectory.verdict.worst(Verdict("degraded", warned.reasons))
+    return replace(trajectory, verdict=verdict)
+
+
+def _simulate(scene: SimScene, config: Simulation, progress: Progress) -> Trajectory:
+    """Simulate; the verdict is what the motions say."""
     model = compile_scene(scene)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -41,13 +63,13 @@ def simulate(
     for frame in range(1, frames + 1):
         mujoco.mj_step(model, data, nstep=steps)
         diverged = bool(
-            data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number
-            or data.warning[mujoco.mjtWarning.mjWARN_BADQPOS].number
-            or data.warning[mujoco.mjtWarning.mjWARN_BADQVEL].number
-            or not np.isfinite(data.qpos).all()
+            any(data.warning[kind].number for kind in UNSTABLE) or not np.isfinite(data.qpos).all()
         )
         if diverged:
             break
+        # MuJoCo warns of a thing once and then counts; from 0 on, it warns again.
+        for warning in data.warning:
+            warning.number = 0
         times.append(frame * steps * TIMESTEP)
         poses.append(body_poses(model, data, scene.bodies))
         if frame % max(1, frames // 20) == 0:

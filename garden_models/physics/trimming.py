@@ -18,6 +18,7 @@ from jaxtyping import Float, Int
 from garden_models.physics.config import Separation
 from garden_models.physics.convex_pieces import hull_piece
 from garden_models.physics.mjcf import write_mjcf
+from garden_models.physics.mujoco_warnings import collect_warnings
 from garden_models.scene import Body, ConvexPiece
 
 ROUNDS = 4
@@ -90,6 +91,7 @@ def trim_overlaps(
     return trimmed, np.array([own.max(initial=0.0) for own in cut])
 
 
+@collect_warnings()
 def _contacts(bodies: tuple[Body, ...]) -> list[_Contact]:
     """Return the deepest contact of every pair of pieces of different bodies, deepest first."""
     mjcf = write_mjcf(bodies, (), np.eye(3))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -55,6 +57,32 @@ def test_a_simulation_that_diverges_is_failed(scene):
     trajectory = simulate(far, Simulation(seconds=1))
     assert trajectory.verdict.status == "failed"
     assert "diverged" in trajectory.verdict.reasons[0]
+    assert any("QPOS" in reason and "unstable" in reason for reason in trajectory.verdict.reasons)
+
+
+def test_contacts_that_do_not_fit_in_memory_make_it_degraded(scene, monkeypatch):
+    """MuJoCo leaves out what does not fit, so a body may sink without tilting or drifting."""
+    boxes = "".join(
+        f"<body pos='{0.05 * i} 0 0.05'><freejoint/><geom type='box' size='.1 .1 .1'/></body>"
+        for i in range(60)
+    )
+    world = f"<worldbody><geom type='plane' size='1 1 1'/>{boxes}</worldbody>"
+    scarce = mujoco.MjModel.from_xml_string(f"<mujoco><size memory='1M'/>{world}</mujoco>")
+    monkeypatch.setattr("garden_models.physics.simulate.compile_scene", lambda scene: scarce)
+    bare = replace(scene, bodies=())
+    trajectory = simulate(bare, Simulation(seconds=0.1, frames_per_second=50))
+    assert trajectory.verdict.status == "degraded"
+    (reason,) = trajectory.verdict.reasons
+    assert re.search(r"warned \d+ times: .*arena memory", reason)
+
+
+def test_no_log_is_left_in_the_users_folder(scene, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (body,) = scene.bodies
+    pose = body.gv_from_body.copy()
+    pose[0, 3] = 1e11
+    simulate(replace(scene, bodies=(replace(body, gv_from_body=pose),)), Simulation(seconds=1))
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_free_fall_is_that_of_gravity(scene):
