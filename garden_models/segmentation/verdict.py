@@ -57,7 +57,12 @@ def judge(
         reasons.append(f"{name!r} is visible in {shown} of {len(masks)} photos only.")
     mask = masks[box.view]
     area = float(np.prod(box.size))
-    if mask.sum() < EMPTY_BOX * area:
+    if not mask.any():
+        reasons.append(
+            f"Nothing was found that ends inside the box of {name!r}: what fills it probably goes "
+            "on outside of it; draw a box that holds all of it."
+        )
+    elif mask.sum() < EMPTY_BOX * area:
         reasons.append(
             f"The object found in the box of {name!r} fills only {mask.sum() / area:.0%} of it."
         )

@@ -15,6 +15,9 @@ from garden_models.segmentation.verdict import judge
 SQUARE = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
 
 
+TABLE = SupportSurface("table_1", "table", 0.0, SQUARE, 4.0, 99)
+
+
 def rectangle(x0, y0, x1, y1):
     mask = np.zeros((60, 80), bool)
     mask[y0:y1, x0:x1] = True
@@ -29,7 +32,7 @@ class Evidence:
     masks: tuple[np.ndarray, ...] = (rectangle(20, 20, 50, 40),) * 4
     points: int = 1000
     outlined: list[Outlined] = field(default_factory=lambda: [Outlined(0.1, 0.9)] * 4)
-    support: SupportSurface | None = SupportSurface("table_1", "table", 0.0, SQUARE, 4.0, 99)
+    support: SupportSurface | None = TABLE
     probability: np.ndarray = field(default_factory=lambda: np.repeat([0.01, 0.99], 100))
 
     def judged(self):
@@ -61,6 +64,10 @@ def test_good_evidence_is_ok():
         ({"points": 149}, "Only 149 reconstructed points"),
         ({"masks": (*GOOD.masks[:2], rectangle(0, 0, 0, 0))}, "visible in 2 of 3 photos only"),
         ({"masks": (rectangle(20, 20, 24, 24), *GOOD.masks)}, "fills only 2% of it"),
+        (
+            {"masks": (rectangle(0, 0, 0, 0), *GOOD.masks)},
+            "Nothing was found that ends inside",
+        ),
         ({"box": (25.0, 18.0, 52.0, 42.0)}, "may cut the object off: 20%"),
         ({"probability": np.repeat([0.45, 0.99], [30, 70])}, "uncertain for 30% of its points"),
         ({"outlined": [Outlined(0.1, 0.5)] * 4}, "agree with its points by only 50%"),
