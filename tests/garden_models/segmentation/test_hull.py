@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,12 @@ def carved(cameras, changed=None, depth=None):
     return carve(LOW, HIGH, views, cameras, targets, windows), masks
 
 
+@cache
+def of_the_ball():
+    """The hull by all views, and their masks."""
+    return carved(AROUND)
+
+
 def volume(hull):
     return len(hull.centres) * hull.cell**3
 
@@ -56,13 +64,13 @@ NOTHING = np.zeros(SIZE[::-1], np.float32)
 
 
 def test_the_hull_of_a_ball_seen_from_all_around_is_the_ball():
-    hull, _ = carved(AROUND)
+    hull, _ = of_the_ball()
     assert 0.95 * BALL < volume(hull) < 1.2 * BALL
     assert np.linalg.norm(hull.centres, axis=1).max() < 1.3 * RADIUS
 
 
 def test_every_voxel_of_the_object_is_in_its_hull():
-    hull, _ = carved(AROUND)
+    hull, _ = of_the_ball()
     axis = np.arange(-0.3 + hull.cell / 2, 0.3, hull.cell)
     grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
     inner = np.linalg.norm(grid, axis=1) < RADIUS - hull.cell
@@ -77,7 +85,7 @@ def test_more_views_never_add_to_the_hull():
 
 
 def test_the_silhouette_of_the_hull_is_the_mask_it_was_carved_from():
-    hull, masks = carved(AROUND)
+    hull, masks = of_the_ball()
     for camera, mask in zip(AROUND, masks, strict=True):
         seen = hull.silhouette(K, camera, slice(0, SIZE[1]), slice(0, SIZE[0]))
         assert (seen & mask).sum() / (seen | mask).sum() > 0.85
@@ -85,7 +93,7 @@ def test_the_silhouette_of_the_hull_is_the_mask_it_was_carved_from():
 
 
 def test_the_silhouette_in_a_window_is_cut_from_the_whole_one():
-    hull, _ = carved(AROUND)
+    hull, _ = of_the_ball()
     whole = hull.silhouette(K, AROUND[0], slice(0, 96), slice(0, 96))
     part = hull.silhouette(K, AROUND[0], slice(10, 90), slice(5, 60))
     np.testing.assert_array_equal(part[8:-8, 8:-8], whole[10:90, 5:60][8:-8, 8:-8])
@@ -112,7 +120,7 @@ def test_without_any_view_of_it_nothing_is_filled(targets):
 
 
 def test_a_camera_that_looks_away_sees_no_silhouette():
-    hull, _ = carved(AROUND)
+    hull, _ = of_the_ball()
     away = invert_rigid(AROUND[0])
     away[:3, 0] *= -1
     away[:3, 2] *= -1
