@@ -104,7 +104,7 @@ def segment(
     if carrier is not None:
         centres = np.stack([invert_rigid(camera)[:3, 3] for camera in scene.cameras])
         support = support_of(target.name, carrier, graph.cloud, scene.cloud, centres)
-    verdict = judge(target, boxes[0], masks, points.xyz, outlined, support, refined.labels[:, 1])
+    verdict = judge(boxes[0], masks, points.xyz, outlined, support, refined.labels[:, 1])
     progress(1.0, "done")
     return ObjectMasks(
         target,

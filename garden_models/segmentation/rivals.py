@@ -18,7 +18,7 @@ from garden_models.segmentation.config import Segment
 from garden_models.segmentation.region import BoxView, box_evidence, box_view, points_around
 from garden_models.segmentation.scene_in_gv import scene_in_gv
 
-BOTH = 0.05
+BOTH = 0.04
 """Boxes are rivals if each holds this share of what the other shows."""
 EITHER = 0.3
 """They are also if one holds this share, as a table's box does of what stands on it."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float
 
-from garden_models.scene import SupportSurface, Target, Verdict
+from garden_models.scene import SupportSurface, Verdict
 from garden_models.segmentation.box import ViewBox
 from garden_models.segmentation.occlusion import Outlined
 from garden_models.segmentation.region import BoxView
@@ -28,8 +28,7 @@ Masks = tuple[Bool[np.ndarray, "h w"], ...]
 
 
 def judge(
-    target: Target,
-    box_view: BoxView,
+    one: BoxView,
     masks: Masks,
     points_gv: Float[np.ndarray, "p 3"],
     outlined: list[Outlined],
@@ -38,10 +37,11 @@ def judge(
 ) -> Verdict:
     """Return ok, or degraded with every reason that holds.
 
-    ``points_gv`` are the object's points, ``probability`` that of all nodes near it.
+    ``one`` is the target's box on its view, ``points_gv`` are the object's points,
+    ``probability`` that of all nodes near it.
     """
     reasons = []
-    name, box, points = target.name, box_view.box, len(points_gv)
+    name, box, points = one.target.name, one.box, len(points_gv)
     if support is None:
         reasons.append(
             f"Nothing carries {name!r}: no level surface touches it from below, so it may hang "
@@ -72,7 +72,7 @@ def judge(
             f"The box of {name!r} may cut the object off: {cut:.0%} of the box's border lies on "
             "it; draw a box that holds all of it."
         )
-    depth = _depth(points_gv, box_view)
+    depth = _depth(points_gv, one)
     if depth > DEEP:
         reasons.append(
             f"{name!r} reaches {depth:.1f} diagonals of its box into the picture: some of what "

@@ -10,7 +10,7 @@ import pytest
 
 from garden_models.geometry.rigid import homogeneous, rigid, transform_points
 from garden_models.geometry.rotation import axis_angle, yaw_gv
-from garden_models.scene import BadGeometry, BadInput, Target
+from garden_models.scene import BadGeometry, BadInput, Rivals, Target
 from garden_models.segmentation.geometric import segment
 from tests.garden_models.segmentation.clouds import cloud
 from tests.garden_models.segmentation.ray_scene import (
@@ -86,7 +86,7 @@ def test_two_things_that_touch_are_told_apart_by_their_boxes(name, label, rival)
         reconstruction,
         gravity,
         target_box(name, label, labels, 0),
-        (target_box("rival", rival, labels, 0),),
+        Rivals((target_box("rival", rival, labels, 0),)),
     )
     assert min(overlaps(masks, labels, label)) >= 0.9
     assert masks.verdict.status == "ok"

@@ -7,15 +7,28 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from garden_models.scene import SupportSurface, Target
+from garden_models.scene import SupportSurface, Target, View
 from garden_models.segmentation.box import ViewBox
 from garden_models.segmentation.occlusion import Outlined
+from garden_models.segmentation.region import BoxView
 from garden_models.segmentation.verdict import judge
 
 SQUARE = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
 
 
 TABLE = SupportSurface("table_1", "table", 0.0, SQUARE, 4.0, 99)
+
+
+VIEW = View(
+    "a.jpg",
+    np.zeros((60, 80, 3), np.uint8),
+    np.ones((60, 80)),
+    np.ones((60, 80)),
+    np.array([[80.0, 0, 40], [0, 80, 30], [0, 0, 1]]),
+    np.eye(4)[:3],
+    (80, 60),
+)
+"""Boxes of the size used here have a diagonal of half a metre at a metre's distance."""
 
 
 def rectangle(x0, y0, x1, y1):
@@ -31,17 +44,19 @@ class Evidence:
     box: tuple[float, float, float, float] = (18.0, 18.0, 52.0, 42.0)
     masks: tuple[np.ndarray, ...] = (rectangle(20, 20, 50, 40),) * 4
     points: int = 1000
+    depth: float = 0.3
     outlined: list[Outlined] = field(default_factory=lambda: [Outlined(0.1, 0.9)] * 4)
     support: SupportSurface | None = TABLE
     probability: np.ndarray = field(default_factory=lambda: np.repeat([0.01, 0.99], 100))
 
     def judged(self):
         box = ViewBox(0, np.array(self.box[:2]), np.array(self.box[2:]))
+        target = Target("cup", "a.jpg", self.box)
+        z = np.linspace(1.0, 1.0 + self.depth, self.points)
         return judge(
-            Target("cup", "a.jpg", self.box),
-            box,
+            BoxView(target, box, VIEW, np.eye(4)),
             self.masks,
-            self.points,
+            np.stack([0 * z, 0 * z, z], 1),
             self.outlined,
             self.support,
             self.probability,
@@ -70,6 +85,7 @@ def test_good_evidence_is_ok():
         ),
         ({"box": (25.0, 18.0, 52.0, 42.0)}, "may cut the object off: 20%"),
         ({"probability": np.repeat([0.45, 0.99], [30, 70])}, "uncertain for 30% of its points"),
+        ({"depth": 3.0}, "diagonals of its box into the picture"),
         ({"outlined": [Outlined(0.1, 0.5)] * 4}, "agree with its points by only 50%"),
         ({"outlined": [Outlined(1.0, float("nan"))] * 4}, "agree with its points by only 0%"),
     ],
