@@ -9,6 +9,7 @@ from flows.command import EXIT_OK, print_json
 from flows.command.scene_options import open_store
 from flows.wrong_use import WrongUse
 from storage import ActionRecord, Store
+from tasks.step.files import counted, listed, split_files
 
 DESCRIPTION = """\
 Tell from which steps, inputs, options and code an artifact came. ARTIFACT is the start of
@@ -38,11 +39,22 @@ def run(options: argparse.Namespace) -> int:
     for entry in chain:
         name = f"{entry['step']}[{entry['target']}]" if entry["target"] else entry["step"]
         print(f"{'  ' * entry['depth']}{name}  {entry['status']}, {entry['seconds']:.2f} s")
-        for line in (f"key     {entry['key']}", f"config  {entry['config']}"):
+        for line in _lines(entry):
             print(f"{'  ' * entry['depth']}    {line}")
-        for reason in entry["reasons"]:
-            print(f"{'  ' * entry['depth']}    {reason}")
     return EXIT_OK
+
+
+def _lines(entry: dict[str, Any]) -> list[str]:
+    """Return what is told of one artifact; its files by name, not by digest."""
+    files, settings = split_files(entry["config"])
+    names = list(files)
+    told = {
+        "because": entry["ran_because"],
+        "files": f"{counted(names)}: {listed(names)}" if names else "",
+        "config": ", ".join(f"{name} {value!r}" for name, value in settings.items()),
+        "key": entry["key"],
+    }
+    return [f"{word:<8}{text}" for word, text in told.items() if text] + entry["reasons"]
 
 
 def _chain(record: ActionRecord, store: Store) -> list[dict[str, Any]]:

@@ -10,6 +10,7 @@ from typing import Any
 from storage.canonical import UNKEYED, is_array, plain_scalar
 from storage.digest import digest_value
 from tasks.step.code import Code
+from tasks.step.files import file_changes, split_files
 from tasks.step.ref import Why
 
 _SHOWN = 60  # characters of a value in a sentence
@@ -95,7 +96,7 @@ def explain(parts: KeyParts, last: Mapping[str, Any] | None) -> Why:
     if last.get("version") != now["version"]:
         changes.append(Why("version", f"step version {last.get('version')} -> {now['version']}"))
     changes += _mapping_changes("input", "input", last, now, "inputs", values=False)
-    changes += _mapping_changes("config", "", last, now, "config", values=True)
+    changes += _config_changes(last.get("config", {}), now["config"])
     for name in ("backend", "seed"):
         if last.get(name) != now[name]:
             changes.append(Why(name, f"{name} {last.get(name)} -> {now[name]}"))
@@ -105,6 +106,15 @@ def explain(parts: KeyParts, last: Mapping[str, Any] | None) -> Why:
     if not changes:
         return Why("evicted", "its result is no longer in the store")
     return Why(changes[0].code, "; ".join(change.sentence for change in changes[:4]))
+
+
+def _config_changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[Why]:
+    """Return what changed in the user's files, by name, and then in the settings."""
+    last, now = ({"config": split_files(leaves)[1]} for leaves in (before, after))
+    return [
+        *(Why("input", sentence) for sentence in file_changes(before, after)),
+        *_mapping_changes("config", "", last, now, "config", values=True),
+    ]
 
 
 def _mapping_changes(
