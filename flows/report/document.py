@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from flows.report.support_document import support_document
 from flows.report.values import ObjectValues, SceneValues
 from flows.scene_run import SceneResult
 from garden_models.scene import (
@@ -13,7 +14,6 @@ from garden_models.scene import (
     GravityView,
     PlacementHypothesis,
     SparseModel,
-    SupportSurface,
     Verdict,
 )
 from tasks.step import Ref, StepEvent
@@ -76,7 +76,7 @@ def report_document(values: SceneValues) -> Json:
         "scale": _scale(values),
         "cameras": _cameras(values.cameras),
         "gravity": _gravity(values.gravity_view),
-        "supports": [_support(s) for s in values.scene.supports] if values.scene else [],
+        "supports": [support_document(s) for s in values.scene.supports] if values.scene else [],
         "objects": _objects(values),
         "background": _background(values),
         **run_section(values.result),
@@ -209,7 +209,7 @@ def _object(values: ObjectValues, motion: BodyMotion | None, body: Any) -> Json:
         "status": verdict.status,
         "reasons": list(verdict.reasons),
         "seen_in": int(sum(m.any() for m in values.masks.masks)),
-        "support": _support(values.masks.support) if values.masks.support else None,
+        "support": support_document(values.masks.support) if values.masks.support else None,
         "mesh": {
             "vertices": len(mesh.vertices),
             "faces": len(mesh.faces),
@@ -252,16 +252,6 @@ def _hypothesis(hypothesis: PlacementHypothesis) -> Json:
         "gv_from_object": hypothesis.gv_from_object.tolist(),
         "scale": _number(hypothesis.scale),
         "scores": {name: _number(score) for name, score in hypothesis.scores.items()},
-    }
-
-
-def _support(support: SupportSurface) -> Json:
-    return {
-        "name": support.name,
-        "kind": support.kind,
-        "height_gv": _number(support.height_gv),
-        "area_m2": _number(support.area_m2),
-        "outline_gv": np.round(support.outline_gv, 4).tolist(),
     }
 
 
