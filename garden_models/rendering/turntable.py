@@ -31,7 +31,7 @@ class Turntable:
     """Share of the brightness that falls with the slant to the viewer; 0: photos' colours
     alone. A little shows the shape where colour does not."""
     margin: float = 1.1
-    """Distance relative to the one at which the object's sphere just fits."""
+    """The picture's side relative to what is in it."""
 
 
 def turn_mesh(
@@ -40,17 +40,25 @@ def turn_mesh(
     vertex_rgb: UInt8[np.ndarray, "v 3"],
     config: Turntable = Turntable(),
 ) -> tuple[Picture, ...]:
-    """Return the mesh (upright, y down) from ``sides`` sides, and from above as the last."""
+    """Return the mesh (upright, y down) from ``sides`` sides, and from above as the last.
+
+    All are drawn to one scale, at which the largest of them fills the picture; each is
+    centred.
+    """
+    vertices = np.asarray(vertices, np.float64)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
-    K = _intrinsics(config)
     distance = config.margin * radius / np.sin(np.radians(config.field_of_view_deg) / 2)
     turns = [(360.0 * i / config.sides, config.elevation_deg) for i in range(config.sides)]
+    sides = [
+        transform_points(look_at(centre + distance * viewer_direction(*turn), centre), vertices)
+        for turn in [*turns, (0.0, 89.9)]
+    ]
+    frames = [_fitted(in_camera, config) for in_camera in sides]
+    zoom = min(K[0, 0] for K in frames)
     pictures = []
-    for yaw_deg, elevation_deg in [*turns, (0.0, 89.9)]:
-        eye = centre + distance * _direction(yaw_deg, elevation_deg)
-        camera = look_at(eye, centre)
-        in_camera = transform_points(camera, np.asarray(vertices, np.float64))
+    for in_camera, fitted in zip(sides, frames, strict=True):
+        K = _zoomed(fitted, zoom / fitted[0, 0], config)
         raster = rasterise_mesh(in_camera, faces, K, config.size, near=1e-3 * distance)
         rgb = interpolate(raster, faces, vertex_rgb)
         slant = _slant(in_camera, faces, raster.face_index, K)
@@ -77,32 +85,38 @@ def view_cloud(
     low, high = np.percentile(points_gv.xyz, [2, 98], axis=0)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     distance = config.margin * radius / np.tan(np.radians(config.field_of_view_deg) / 2)
-    camera = look_at(centre + distance * _direction(yaw_deg, elevation_deg), centre)
+    camera = look_at(centre + distance * viewer_direction(yaw_deg, elevation_deg), centre)
     inner = ((points_gv.xyz >= low) & (points_gv.xyz <= high)).all(axis=1)
     splats = splat_points(
         points_gv,
         camera,
-        _fitted(points_gv.xyz[inner] if inner.any() else points_gv.xyz, camera, config),
+        _fitted(
+            transform_points(camera, points_gv.xyz[inner] if inner.any() else points_gv.xyz), config
+        ),
         config.size,
         Splatting(near=max(1e-3, 0.2 * (distance - radius))),
     )
     return _on_backdrop(splats.rgb, splats.depth > 0, config)
 
 
-def _fitted(
-    points: Float[np.ndarray, "n 3"], camera: Float[np.ndarray, "3 4"], config: Turntable
-) -> Float[np.ndarray, "3 3"]:
-    """Return K, zoomed and shifted so that the points fill the picture."""
+def _fitted(in_camera: Float[np.ndarray, "n 3"], config: Turntable) -> Float[np.ndarray, "3 3"]:
+    """Return K, zoomed and shifted so that the points (in the camera's frame) fill the picture."""
     width, height = config.size
     K = _intrinsics(config)
-    in_camera = transform_points(camera, points)
     pixels = (in_camera / in_camera[:, 2:]) @ K[:2].T
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     extent = np.maximum(high - low, 1e-6)
-    zoom = float(min(width / extent[0], height / extent[1])) / config.margin
-    K[:2] *= zoom
-    K[:2, 2] += np.array([width, height]) / 2 - zoom * (low + high) / 2
-    return K
+    K[:2, 2] += np.array([width, height]) / 2 - (low + high) / 2
+    return _zoomed(K, float(min(width / extent[0], height / extent[1])) / config.margin, config)
+
+
+def _zoomed(
+    K: Float[np.ndarray, "3 3"], zoom: float, config: Turntable
+) -> Float[np.ndarray, "3 3"]:
+    """Return K with everything ``zoom`` times as large about the middle of the picture."""
+    width, height = config.size
+    middle = np.array([[1.0, 0, width / 2], [0, 1.0, height / 2], [0, 0, 1.0]])
+    return middle @ np.diag([zoom, zoom, 1.0]) @ np.linalg.inv(middle) @ K
 
 
 def look_at(
@@ -116,7 +130,7 @@ def look_at(
     return np.concatenate([rotation, (-rotation @ eye)[:, None]], axis=1)
 
 
-def _direction(yaw_deg: float, elevation_deg: float) -> Float[np.ndarray, "3"]:
+def viewer_direction(yaw_deg: float, elevation_deg: float) -> Float[np.ndarray, "3"]:
     """Return the unit vector from the centre to the viewer."""
     yaw, elevation = np.radians([yaw_deg, elevation_deg])
     flat = -np.array([np.sin(yaw), 0.0, np.cos(yaw)])
