@@ -2,57 +2,105 @@
 
 from __future__ import annotations
 
-import re
+from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
 
 from flows.report.document import Json, object_verdict
 from flows.report.object_section import object_section
+from flows.report.points_section import points_section
 from flows.report.scene_section import (
     background_section,
     depth_section,
     gravity_section,
     photo_section,
-    points_section,
 )
 from flows.report.values import SceneValues
 
-STEPS_START, STEPS_END = "<!-- steps -->", "<!-- /steps -->"
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the page with a heading, found from the list at its top."""
+
+    title: str
+    body: str
+    status: str = ""
 
 
 def report_page(values: SceneValues, document: Json) -> str:
     """Return the whole page."""
-    motions = {m.name: m for m in values.trajectory.motions} if values.trajectory else {}
-    sections = [
+    sections = [section for section in _sections(values, document) if section.body]
+    links = " · ".join(
+        f'<a href="#part-{i}">{escape(section.title)}</a>' for i, section in enumerate(sections)
+    )
+    parts = [
         _head(document),
+        _marked("run", run_line(document)),
         _facts(document),
-        photo_section(values),
+        f"<nav>{links}</nav>",
         *(
-            object_section(o, values, object_verdict(o, motions.get(o.target.name)))
-            for o in values.objects
+            f'<section id="part-{i}"><h2>{escape(section.title)} {_badge(section.status)}</h2>'
+            f"{section.body}</section>"
+            for i, section in enumerate(sections)
         ),
-        _failed_objects(document),
-        background_section(values),
-        points_section(values),
-        gravity_section(values),
-        depth_section(values),
-        STEPS_START + steps_section(document) + STEPS_END,
     ]
     style = files("flows.report").joinpath("page.css").read_text("utf-8")
     script = files("flows.report").joinpath("points_viewer.js").read_text("utf-8")
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(document['scene'])} · GARDEN</title><style>{style}</style></head>"
-        f"<body><main>{''.join(sections)}</main><script>{script}</script></body></html>"
+        f'<link rel="icon" href="data:,"><title>{escape(document["scene"])} · GARDEN</title>'
+        f"<style>{style}</style></head>"
+        f"<body><main>{''.join(parts)}</main><script>{script}</script></body></html>"
     )
 
 
+def _sections(values: SceneValues, document: Json) -> list[Section]:
+    motions = {m.name: m for m in values.trajectory.motions} if values.trajectory else {}
+    objects = []
+    for factored in values.objects:
+        name = factored.target.name
+        verdict = object_verdict(factored, motions.get(name))
+        objects.append(Section(name, object_section(factored, values, verdict), verdict.status))
+    return [
+        Section("Photos and renders" if values.renders else "Photos", photo_section(values)),
+        Section("The scene, upright", points_section(values)),
+        *objects,
+        *_failed_objects(document),
+        Section("Background", background_section(values)),
+        Section("Gravity", gravity_section(values)),
+        Section("Depth", depth_section(values)),
+        Section("Steps", _marked("steps", steps_section(document))),
+    ]
+
+
+def _marked(name: str, html: str) -> str:
+    return f"<!-- {name} -->{html}<!-- /{name} -->"
+
+
 def with_steps_of(page: str, document: Json) -> str:
-    """Return the page with its table of steps replaced by that of another run."""
-    pattern = re.compile(re.escape(STEPS_START) + ".*?" + re.escape(STEPS_END), re.DOTALL)
-    section = STEPS_START + steps_section(document) + STEPS_END
-    return pattern.sub(lambda _: section, page)
+    """Return the page with what it tells of a run replaced by another run's."""
+    for name, html in (("run", run_line(document)), ("steps", steps_section(document))):
+        start, end = _marked(name, "|").split("|")
+        before, _, rest = page.partition(start)
+        page = before + _marked(name, html) + rest.partition(end)[2]
+    return page
+
+
+def run_line(document: Json) -> str:
+    """Return what this run did in one sentence."""
+    outcomes = [step["outcome"] for step in document["steps"]]
+    counts = [
+        f"{outcomes.count(outcome)} {words}"
+        for outcome, words in (
+            ("executed", "executed"),
+            ("cached", "found in the store"),
+            ("failed", "failed"),
+        )
+        if outcomes.count(outcome)
+    ]
+    seconds = document["seconds"]
+    return f'<p class="dim">Steps: {", ".join(counts) or "none"}, in {seconds:.1f} s.</p>'
 
 
 def steps_section(document: Json) -> str:
@@ -68,26 +116,27 @@ def steps_section(document: Json) -> str:
             f"<td>{escape(step['outcome'] or '')}</td><td>{_badge(step['status'])}</td>"
             f'<td class="n" title="{detail} s">{total:.2f}</td>'
             f'<td class="n">{step["peak_mb"] or 0:.0f}</td>'
-            f"<td>{escape('; '.join(step['reasons']))} "
+            f"<td class='why'>{escape('; '.join(step['reasons']))} "
             f'<span class="dim">{escape(step["why"])}</span></td></tr>'
         )
     return (
-        f"<h2>Steps</h2><p class='dim'>{document['executed']} executed in this run, "
-        f"{document['seconds']:.1f} s in all. Seconds are those of the run that computed the "
-        "artifact.</p><div class='card scroll'><table><tr><th>step</th><th>backend</th>"
-        "<th>outcome</th><th>verdict</th><th class='n'>seconds</th><th class='n'>peak MB</th>"
+        f"<p class='dim'>{document['executed']} executed in this run, {document['seconds']:.1f} s "
+        "in all. Seconds and memory are those of the run that computed the result.</p>"
+        "<div class='card scroll'><table><tr><th>step</th><th>backend</th><th>outcome</th>"
+        "<th>verdict</th><th class='n'>seconds</th><th class='n'>peak MB</th>"
         f"<th>reasons, and why it ran or not</th></tr>{''.join(rows)}</table></div>"
     )
 
 
 def _badge(status: str) -> str:
-    return f'<span class="verdict {status}">{status}</span>'
+    return f'<span class="verdict {status}">{status}</span>' if status else ""
 
 
 def _head(document: Json) -> str:
-    reasons = "".join(f"<p>{escape(reason)}</p>" for reason in document["reasons"])
-    remarks = "".join(f"<p class='dim'>{escape(remark)}</p>" for remark in document["remarks"])
-    return f"<h1>{escape(document['scene'])} {_badge(document['status'])}</h1>{reasons}{remarks}"
+    return (
+        f"<h1>{escape(document['scene'])} {_badge(document['status'])}</h1>"
+        f"{_paragraphs(document['reasons'], 'reason')}{_paragraphs(document['remarks'], 'dim')}"
+    )
 
 
 def _facts(document: Json) -> str:
@@ -96,11 +145,12 @@ def _facts(document: Json) -> str:
     if gravity:
         facts.append(("gravity known to", f"± {gravity['sigma_deg']:.2f}°"))
     if scale:
-        facts.append(("scale", f"{escape(scale['source'])}"))
-    facts.append(("objects", str(len(document["objects"]))))
+        source = "assumed" if scale["source"] == "unknown" else scale["source"].replace("_", " ")
+        facts.append(("scale", escape(source)))
+    placed = sum("placement" in o for o in document["objects"])
+    facts.append(("objects factored out", f"{placed} of {len(document['objects'])}"))
     if document["background"]:
         facts.append(("background points", f"{document['background']['points']:,}"))
-    facts.append(("this run", f"{document['seconds']:.0f} s"))
     cells = "".join(f"<div><b>{value}</b>{name}</div>" for name, value in facts)
     notes = []
     if photos["unregistered"] and photos["given"]:
@@ -111,10 +161,13 @@ def _facts(document: Json) -> str:
     return f'<div class="facts">{cells}</div>{"".join(notes)}'
 
 
-def _failed_objects(document: Json) -> str:
-    return "".join(
-        f'<h2>{escape(o["name"])} {_badge("failed")}</h2><div class="card">'
-        f"<p>{escape('; '.join(o['reasons']))}</p></div>"
+def _failed_objects(document: Json) -> list[Section]:
+    return [
+        Section(o["name"], f'<div class="card">{_paragraphs(o["reasons"])}</div>', "failed")
         for o in document["objects"]
         if "placement" not in o
-    )
+    ]
+
+
+def _paragraphs(sentences: list[str], style: str = "") -> str:
+    return "".join(f'<p class="{style}">{escape(sentence)}</p>' for sentence in sentences)

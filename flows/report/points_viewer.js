@@ -1,57 +1,108 @@
-// Show the coloured points upright: drag to turn, wheel to zoom, shift-drag to pan.
+// Show the coloured points upright (y is down, as in Gravity-View). The page says how to use it.
 (() => {
   const canvas = document.getElementById('points');
   const gl = canvas && canvas.getContext('webgl', { antialias: true });
-  if (!gl) return;
-  const bytes = (id) => Uint8Array.from(atob(document.getElementById(id).textContent.trim()), c => c.charCodeAt(0));
-  const packed = bytes('points-data');
-  const scale = parseFloat(canvas.dataset.scale);
-  const count = packed.length / 9;
-  const shader = (type, text) => { const s = gl.createShader(type); gl.shaderSource(s, text); gl.compileShader(s); return s; };
+  if (!gl) return; // the message and the pictures stay
+  const groups = JSON.parse(canvas.dataset.groups), first = JSON.parse(canvas.dataset.view);
+  const packed = Uint8Array.from(atob(document.getElementById('points-data').textContent), c => c.charCodeAt(0));
+
   const program = gl.createProgram();
-  gl.attachShader(program, shader(gl.VERTEX_SHADER, `
-    attribute vec3 low; attribute vec3 high; attribute vec3 colour; uniform mat4 clip; uniform float size; varying vec3 shade;
-    void main() { vec3 p = (high * 255.0 * 256.0 + low * 255.0) / 65535.0 * 2.0 - 1.0;
-      gl_Position = clip * vec4(p, 1.0); gl_PointSize = clamp(size / gl_Position.w, 1.0, 12.0); shade = colour; }`));
-  gl.attachShader(program, shader(gl.FRAGMENT_SHADER, `
-    precision mediump float; varying vec3 shade; void main() { gl_FragColor = vec4(shade, 1.0); }`));
-  gl.linkProgram(program); gl.useProgram(program);
+  const attach = (type, text) => { const s = gl.createShader(type); gl.shaderSource(s, text); gl.compileShader(s); gl.attachShader(program, s); };
+  attach(gl.VERTEX_SHADER, `
+    attribute vec3 low, high, colour; uniform mat4 clip; uniform float size; varying vec3 shade;
+    void main() {
+      vec3 place = (high * 255.0 * 256.0 + low * 255.0) / 65535.0 * 2.0 - 1.0;
+      gl_Position = clip * vec4(place, 1.0);
+      gl_PointSize = clamp(size / gl_Position.w, 1.5, 40.0);
+      shade = colour;
+    }`);
+  attach(gl.FRAGMENT_SHADER, `
+    precision mediump float; varying vec3 shade;
+    void main() { if (length(gl_PointCoord - 0.5) > 0.5) discard; gl_FragColor = vec4(shade, 1.0); }`);
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) return;
+  gl.useProgram(program);
   gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
   gl.bufferData(gl.ARRAY_BUFFER, packed, gl.STATIC_DRAW);
   ['low', 'high', 'colour'].forEach((name, i) => {
     const at = gl.getAttribLocation(program, name);
-    gl.enableVertexAttribArray(at); gl.vertexAttribPointer(at, 3, gl.UNSIGNED_BYTE, true, 9, 3 * i);
+    gl.enableVertexAttribArray(at);
+    gl.vertexAttribPointer(at, 3, gl.UNSIGNED_BYTE, true, 9, 3 * i);
   });
-  gl.enable(gl.DEPTH_TEST); gl.clearColor(0.125, 0.149, 0.169, 1);
-  let yaw = 0.5, pitch = 0.45, distance = 2.2, panX = 0, panY = 0;
-  const multiply = (a, b) => { const o = new Float32Array(16);
-    for (let c = 0; c < 4; c++) for (let r = 0; r < 4; r++) for (let k = 0; k < 4; k++) o[c * 4 + r] += a[k * 4 + r] * b[c * 4 + k];
-    return o; };
-  const draw = () => {
-    const ratio = window.devicePixelRatio || 1, w = canvas.clientWidth * ratio, h = canvas.clientHeight * ratio;
-    if (canvas.width !== w || canvas.height !== h) { canvas.width = w; canvas.height = h; }
-    gl.viewport(0, 0, w, h); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    const f = 1.6, near = 0.01, far = 20, cy = Math.cos(yaw), sy = Math.sin(yaw), cp = Math.cos(pitch), sp = Math.sin(pitch);
-    const projection = [f * h / w, 0, 0, 0, 0, f, 0, 0, 0, 0, -(far + near) / (far - near), -1, 0, 0, -2 * far * near / (far - near), 0];
-    // y is down in Gravity-View: flip y and z to get the picture's y up, then turn and tilt.
-    const flip = [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1];
-    const turn = [cy, 0, -sy, 0, 0, 1, 0, 0, sy, 0, cy, 0, 0, 0, 0, 1];
-    const tilt = [1, 0, 0, 0, 0, cp, sp, 0, 0, -sp, cp, 0, panX, panY, -distance, 1];
-    gl.uniformMatrix4fv(gl.getUniformLocation(program, 'clip'), false, multiply(new Float32Array(projection), multiply(new Float32Array(tilt), multiply(new Float32Array(turn), new Float32Array(flip)))));
-    gl.uniform1f(gl.getUniformLocation(program, 'size'), 2.4 * scale * h);
-    gl.drawArrays(gl.POINTS, 0, count);
+  gl.enable(gl.DEPTH_TEST);
+  gl.clearColor(0.125, 0.149, 0.169, 1);
+  document.getElementById('viewer').hidden = false;
+  document.getElementById('no-viewer').hidden = true;
+
+  let view;
+  const reset = () => { view = { ...first, centre: [...first.centre] }; };
+  // The camera's axes: right, down and forward (OpenCV), and where it stands.
+  const camera = () => {
+    const { yaw, elevation, distance, centre } = view;
+    const ce = Math.cos(elevation), se = Math.sin(elevation), cy = Math.cos(yaw), sy = Math.sin(yaw);
+    const forward = [sy * ce, se, cy * ce], right = [cy, 0, -sy], down = [-sy * se, ce, -cy * se];
+    return { right, down, forward, eye: centre.map((c, i) => c - distance * forward[i]) };
   };
+  const clipMatrix = (aspect) => {
+    const { right, down, forward, eye } = camera();
+    const near = 0.02 * view.distance, far = view.distance + 6;
+    const a = (far + near) / (far - near), b = -2 * far * near / (far - near), f = view.focal;
+    const row = (axis, factor) => [...axis.map(v => v * factor), -factor * axis.reduce((s, v, i) => s + v * eye[i], 0)];
+    const x = row(right, f / aspect), y = row(down, -f), w = row(forward, 1), z = row(forward, a);
+    z[3] += b;
+    const columns = [];
+    for (let c = 0; c < 4; c++) columns.push(x[c], y[c], z[c], w[c]);
+    return columns;
+  };
+  const isShown = (name) => { const box = document.querySelector(`input[data-group="${name}"]`); return !box || box.checked; };
+  const uniform = (name) => gl.getUniformLocation(program, name);
+  const draw = () => {
+    const ratio = window.devicePixelRatio || 1;
+    const w = Math.round(canvas.clientWidth * ratio), h = Math.round(canvas.clientHeight * ratio);
+    if (canvas.width !== w || canvas.height !== h) { canvas.width = w; canvas.height = h; }
+    gl.viewport(0, 0, w, h);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.uniformMatrix4fv(uniform('clip'), false, clipMatrix(w / h));
+    for (const group of groups.filter(g => isShown(g.name))) {
+      gl.uniform1f(uniform('size'), 2.4 * group.spacing * view.focal * h / 2);
+      gl.drawArrays(gl.POINTS, group.start, group.count);
+    }
+  };
+
+  const turn = (dx, dy) => {
+    view.yaw += dx;
+    view.elevation = Math.min(1.55, Math.max(-1.55, view.elevation + dy));
+  };
+  const move = (dx, dy) => {
+    const { right, down } = camera(), step = 2 * view.distance / (view.focal * canvas.clientHeight);
+    view.centre = view.centre.map((c, i) => c - step * (dx * right[i] + dy * down[i]));
+  };
+  const zoom = (factor) => { view.distance = Math.min(8, Math.max(0.02, view.distance * factor)); };
   let held = null;
   canvas.addEventListener('pointerdown', e => { held = [e.clientX, e.clientY]; canvas.setPointerCapture(e.pointerId); });
-  canvas.addEventListener('pointerup', () => { held = null; });
+  for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, () => { held = null; });
   canvas.addEventListener('pointermove', e => {
     if (!held) return;
-    const dx = e.clientX - held[0], dy = e.clientY - held[1]; held = [e.clientX, e.clientY];
-    if (e.shiftKey) { panX += dx * distance / 700; panY -= dy * distance / 700; }
-    else { yaw += dx / 200; pitch = Math.min(1.55, Math.max(-1.55, pitch + dy / 200)); }
+    const dx = e.clientX - held[0], dy = e.clientY - held[1];
+    held = [e.clientX, e.clientY];
+    if (e.shiftKey) move(dx, dy); else turn(dx / 200, dy / 200);
     draw();
   });
-  canvas.addEventListener('wheel', e => { e.preventDefault(); distance = Math.min(8, Math.max(0.15, distance * Math.exp(e.deltaY / 600))); draw(); }, { passive: false });
+  // Only once it was clicked: a wheel that scrolls the page shall not end here.
+  canvas.addEventListener('wheel', e => {
+    if (document.activeElement !== canvas) return;
+    e.preventDefault();
+    zoom(Math.exp(e.deltaY / 600));
+    draw();
+  }, { passive: false });
+  const keys = {
+    ArrowLeft: () => turn(-0.1, 0), ArrowRight: () => turn(0.1, 0), ArrowUp: () => turn(0, 0.1), ArrowDown: () => turn(0, -0.1),
+    '+': () => zoom(0.9), '=': () => zoom(0.9), '-': () => zoom(1.1),
+  };
+  canvas.addEventListener('keydown', e => { if (keys[e.key]) { e.preventDefault(); keys[e.key](); draw(); } });
+  document.getElementById('reset').addEventListener('click', () => { reset(); draw(); });
+  document.querySelectorAll('input[data-group]').forEach(box => box.addEventListener('change', draw));
   window.addEventListener('resize', draw);
+  reset();
   draw();
 })();

@@ -1,17 +1,16 @@
-"""Show the scene: photos beside renders, the points turned upright, gravity, depth maps."""
+"""Show the scene: photos beside renders, gravity, the background, depth maps."""
 
 from __future__ import annotations
 
-import base64
 from html import escape
 
 import numpy as np
 
-from flows.report.pictures import data_uri, depth_picture, draw_box
+from flows.report.pictures import depth_picture, draw_box, figure
 from flows.report.values import SceneValues
-from garden_models.scene import PointCloud
 
-POINTS_SHOWN = 60_000
+VIEWS_SHOWN = 3
+PHOTOS_SHOWN = 12
 
 
 def photo_section(values: SceneValues) -> str:
@@ -19,47 +18,57 @@ def photo_section(values: SceneValues) -> str:
     if values.renders is None or values.reconstruction is None:
         return _photos_only(values)
     views = {view.photo: view for view in values.reconstruction.views}
+    end = f"{values.trajectory.times_s[-1]:.0f} s" if values.trajectory else "the simulation"
     rows = []
     for render in values.renders.renders:
-        view = views[render.photo]
-        pictures = [
-            (f"photo {render.photo}", view.rgb),
-            ("render before", render.before),
-            ("render after 10 s", render.after),
-            ("background alone", render.background),
+        name = render.photo
+        figures = [
+            figure(views[name].rgb, f"photo {name}", long_side=460),
+            figure(render.before, "rendered as composed", f"render of {name} as composed", 460),
+            figure(render.after, f"rendered after {end}", f"render of {name} after {end}", 460),
+            figure(render.background, "background alone", f"background of {name} alone", 460),
         ]
-        rows.append(f'<div class="row four">{_figures(pictures, 460)}</div>')
-    first, rest = "".join(rows[:3]), "".join(rows[3:])
-    more = f"<details><summary>{len(rows) - 3} more views</summary>{rest}</details>" if rest else ""
-    return f'<h2>Photos and renders</h2><div class="card">{first}{more}</div>'
+        rows.append(f'<div class="row four">{"".join(figures)}</div>')
+    first, rest = "".join(rows[:VIEWS_SHOWN]), "".join(rows[VIEWS_SHOWN:])
+    count = len(rows) - VIEWS_SHOWN
+    more = f"<details><summary>{count} more views</summary>{rest}</details>" if rest else ""
+    return (
+        '<p class="dim">Each photo beside the scene drawn by its camera; grey is where no point '
+        f'was reconstructed.</p><div class="card">{first}{more}</div>'
+    )
 
 
 def _photos_only(values: SceneValues) -> str:
     if values.capture is None:
         return ""
-    boxes = {t.photo: t for t in values.result.request.targets}
-    pictures = []
-    for photo in values.capture.photos[:12]:
-        rgb = photo.rgb
-        if photo.name in boxes:
+    figures = []
+    for photo in values.capture.photos[:PHOTOS_SHOWN]:
+        rgb, caption = photo.rgb.copy(), photo.name
+        for target in (t for t in values.result.request.targets if t.photo == photo.name):
             factor = rgb.shape[1] / photo.original_size[0]
-            x0, y0, x1, y1 = (factor * v for v in boxes[photo.name].box)
+            x0, y0, x1, y1 = (factor * v for v in target.box)
             rgb = draw_box(rgb, (x0, y0, x1, y1))
-        pictures.append((photo.name, rgb))
-    return f'<h2>Photos</h2><div class="card row four">{_figures(pictures, 320)}</div>'
+            caption += f", box of {target.name}"
+        figures.append(figure(rgb, caption, f"photo {caption}", 320))
+    hidden = len(values.capture.photos) - len(figures)
+    more = f"<p class='dim'>and {hidden} more photos</p>" if hidden > 0 else ""
+    return f'<div class="card"><div class="row four">{"".join(figures)}</div>{more}</div>'
 
 
 def depth_section(values: SceneValues) -> str:
     """Return every view's depth map."""
     if values.reconstruction is None:
         return ""
-    pictures = []
+    figures = []
     for view in values.reconstruction.views:
-        share = float((view.depth > 0).mean())
-        pictures.append((f"{view.photo}, {share:.0%} valid", depth_picture(view.depth)))
+        picture, span = depth_picture(view.depth)
+        metres = f"{span[0]:.2f} to {span[1]:.2f} m" if span else "no depth"
+        caption = f"{view.photo}: {metres}, {(view.depth > 0).mean():.0%} of the pixels"
+        figures.append(figure(picture, caption, f"depth map of {caption}", 260))
     return (
-        "<h2>Depth</h2><details open><summary>near is warm, grey has no depth</summary>"
-        f'<div class="card row strip">{_figures(pictures, 260)}</div></details>'
+        f"<details><summary>{len(figures)} depth maps: near is warm, grey has no depth; the "
+        "colours span the metres in the captions</summary>"
+        f'<div class="card row strip">{"".join(figures)}</div></details>'
     )
 
 
@@ -72,12 +81,13 @@ def gravity_section(values: SceneValues) -> str:
     for cue in gravity.evidence:
         cosine = float(np.clip(cue.down_world @ gravity.down_world, -1, 1))
         rows.append(
-            f"<tr><td>{escape(cue.method)}</td><td>{'yes' if cue.accepted else 'no'}</td>"
+            f"<tr><td>{escape(cue.method.replace('_', ' '))}</td>"
+            f"<td>{'yes' if cue.accepted else 'no'}</td>"
             f'<td class="n">{np.degrees(np.arccos(cosine)):.2f}°</td>'
             f'<td class="n">± {cue.sigma_deg:.2f}°</td><td>{escape(cue.note)}</td></tr>'
         )
     return (
-        f"<h2>Gravity</h2><div class='card scroll'><p>Gravity is known to ± "
+        f"<div class='card scroll'><p>Gravity is known to ± "
         f"{gravity.sigma_deg:.2f}° (1 sigma); reference photo "
         f"{escape(gravity.reference_photo)}.</p><table><tr><th>cue</th><th>believed</th>"
         "<th class='n'>off the result</th><th class='n'>its own sigma</th><th>note</th></tr>"
@@ -92,62 +102,7 @@ def background_section(values: SceneValues) -> str:
         return ""
     removed = ", ".join(f"{escape(n)}: {c:,}" for n, c in background.removed.items())
     return (
-        f"<h2>Background</h2><div class='card'><p>{len(background.points_gv):,} points; removed "
+        f"<div class='card'><p>{len(background.points_gv):,} points; removed "
         f"{removed or 'nothing'}; {int(background.filled.sum()):,} points fill the holes that the "
         "objects left on what carries them.</p></div>"
-    )
-
-
-def points_section(values: SceneValues) -> str:
-    """Return the point cloud turned upright, to be turned with the mouse."""
-    if values.background is not None:
-        points = values.background.points_gv
-    elif values.reconstruction is not None and values.gravity_view is not None:
-        points = _in_gv(values)
-    else:
-        return ""
-    packed, scale = pack_points(points, POINTS_SHOWN)
-    data = base64.b64encode(packed).decode()
-    return (
-        "<h2>Points, upright</h2><p class='dim'>Drag to turn, wheel to zoom, shift-drag to "
-        f"move. Down is gravity.</p><canvas id='points' data-scale='{scale:.6f}'></canvas>"
-        f"<script type='text/plain' id='points-data'>{data}</script>"
-    )
-
-
-def pack_points(points: PointCloud, limit: int) -> tuple[bytes, float]:
-    """Pack at most ``limit`` points as low bytes, high bytes and colours (9 bytes each).
-
-    Returns the bytes and the shown points' spacing as a share of half the cube's side.
-    """
-    keep = np.linspace(0, len(points) - 1, min(limit, len(points))).astype(int)
-    xyz = points.xyz[keep]
-    low, high = np.percentile(xyz, [1, 99], axis=0)
-    half = max(float((high - low).max()) / 2, 1e-6)
-    level = np.clip((xyz - (low + high) / 2) / half, -1, 1)
-    quantised = np.round((level + 1) / 2 * 65535).astype(np.uint16)
-    packed = np.concatenate(
-        [(quantised & 255).astype(np.uint8), (quantised >> 8).astype(np.uint8), points.rgb[keep]],
-        axis=1,
-    )
-    thinning = np.sqrt(len(points) / max(len(keep), 1))
-    return packed.tobytes(), float(np.median(points.spacing[keep]) * thinning / half)
-
-
-def _in_gv(values: SceneValues) -> PointCloud:
-    from dataclasses import replace
-
-    from garden_models.geometry.rigid import transform_points
-
-    assert values.reconstruction is not None
-    assert values.gravity_view is not None
-    points = values.reconstruction.points_world
-    return replace(points, xyz=transform_points(values.gravity_view.gv_from_world, points.xyz))
-
-
-def _figures(pictures: list[tuple[str, np.ndarray]], long_side: int) -> str:
-    return "".join(
-        f'<figure><img loading="lazy" src="{data_uri(rgb, long_side)}" alt=""><figcaption>'
-        f"{escape(name)}</figcaption></figure>"
-        for name, rgb in pictures
     )
