@@ -148,7 +148,8 @@ def _facts(document: Json) -> str:
         source = "assumed" if scale["source"] == "unknown" else scale["source"].replace("_", " ")
         facts.append(("scale", escape(source)))
     placed = sum("placement" in o for o in document["objects"])
-    facts.append(("objects factored out", f"{placed} of {len(document['objects'])}"))
+    asked = len(document["objects"])
+    facts.append(("objects factored out", f"{placed} of {asked}") if asked else ("targets", "none"))
     if document["background"]:
         facts.append(("background points", f"{document['background']['points']:,}"))
     cells = "".join(f"<div><b>{value}</b>{name}</div>" for name, value in facts)

@@ -29,7 +29,7 @@ from garden_models.scene import Body, PointCloud, View
 NEAR_POINTS, FAR_POINTS, OBJECT_POINTS = 70_000, 40_000, 40_000
 """Most points in the viewer: of the background near the objects, and beyond, and of objects."""
 
-STILL_SIZE = (720, 450)
+STILL_POINTS, STILL_SIZE = 250_000, (720, 450)
 BACKDROP = (32, 38, 43)
 """As behind the viewer (page.css)."""
 
@@ -169,7 +169,7 @@ def _still(shown: _Shown, viewpoint: Viewpoint, near: float) -> np.ndarray:
     picture = render_scene(
         shown.bodies,
         shown.poses,
-        shown.background,
+        thinned(shown.background, STILL_POINTS),
         viewpoint.camera_from_gv,
         intrinsics(STILL_SIZE),
         STILL_SIZE,

@@ -41,6 +41,7 @@ def photo_section(values: SceneValues) -> str:
 def _photos_only(values: SceneValues) -> str:
     if values.capture is None:
         return ""
+    unregistered = values.cameras.unregistered if values.cameras else ()
     figures = []
     for photo in values.capture.photos[:PHOTOS_SHOWN]:
         rgb, caption = photo.rgb.copy(), photo.name
@@ -49,6 +50,7 @@ def _photos_only(values: SceneValues) -> str:
             x0, y0, x1, y1 = (factor * v for v in target.box)
             rgb = draw_box(rgb, (x0, y0, x1, y1))
             caption += f", box of {target.name}"
+        caption += ", not registered" if photo.name in unregistered else ""
         figures.append(figure(rgb, caption, f"photo {caption}", 320))
     hidden = len(values.capture.photos) - len(figures)
     more = f"<p class='dim'>and {hidden} more photos</p>" if hidden > 0 else ""
