@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
+from flows.benchmark.plain_plane_sweep import plain_plane_sweep
 from flows.benchmark.truth import TrueCameras, read_true_cameras, read_true_depth
 from flows.capture import find_capture
 from flows.factorize import SceneRefs, factorize_scene
@@ -16,15 +17,19 @@ from flows.preset import Preset
 from flows.report.values import SceneValues, load_values
 from flows.scene_run import SceneRequest, SceneResult
 from garden_models.metrics.camera_pose import true_from_estimated_rotation
+from garden_models.metrics.depth import DepthScore, score_depths, truth_at_view
 from garden_models.metrics.gravity import angular_error_deg
-from garden_models.scene import GravityView, Reconstruction, Target
+from garden_models.reconstruction.densify import densify
+from garden_models.reconstruction.stereo_plan import plan_stereo
+from garden_models.reconstruction.undistort import working_views
+from garden_models.scene import Capture, GravityView, Reconstruction, SparseModel, Target, View
 from garden_models.targets.boxes import parse_targets
 from storage import Store
 from tasks.align_gravity import align_gravity
 from tasks.ingest import ingest
 from tasks.reconstruct import reconstruct
 from tasks.register import register
-from tasks.step import RunContext, load, run_context
+from tasks.step import Ref, RunContext, load, run_context
 
 Row = dict[str, Any]
 
@@ -41,28 +46,54 @@ def reconstructed_scene(folder: Path, store: Store) -> SceneValues:
         return load_values(SceneResult(request, refs, list(context.outcomes)))
 
 
-def depth_row(folder: Path, store: Store) -> Row:
-    """Return the error of our depth, with estimated cameras and one scale for the scene."""
-    truth = read_true_cameras(folder)
-    reconstruction, _ = _upright(folder, store, given=False)
-    ratios, valid, known = [], 0, 0
-    for view in reconstruction.views:
-        true = read_true_depth(folder, view.photo)
-        if true is None:
-            continue
-        true = cv2.resize(true, view.size, interpolation=cv2.INTER_NEAREST_EXACT)
-        both = (true > 0) & (view.depth > 0)
-        ratios.append(view.depth[both] / true[both])
-        valid, known = valid + int(both.sum()), known + int((true > 0).sum())
-    ratio = np.concatenate(ratios)
-    error = np.abs(ratio / np.median(ratio) - 1)
+def depth_rows(folder: Path, store: Store) -> list[Row]:
+    """Return our depth and a plain plane sweep's, with the same estimated cameras and photos,
+    one scale for the scene each, and how long both took, one after the other.
+    """
+    read_true_cameras(folder)
+    with run_context(RunContext(store=store, scene=folder.name)):
+        capture, cameras = (load(ref, kind) for ref, kind in _registered(folder, given=False))
+    config = Preset().reconstruct
+    started = time.perf_counter()
+    views = densify(capture, cameras, config).views
+    ours = time.perf_counter() - started
+    truths = [_true_depth(folder, view) for view in views]
+    started = time.perf_counter()
+    plan = plan_stereo(working_views(capture, cameras, config.long_side), cameras, config)
+    plain = plain_plane_sweep(plan)
+    theirs = time.perf_counter() - started
+    registered = f"{len(views)}/{len(capture.photos)}"
+    methods = [
+        ("ours", [view.depth for view in views], ours),
+        ("plain sweep", plain, theirs),
+    ]
+    return [
+        {
+            "capture": folder.name,
+            "registered": registered,
+            "method": method,
+            **_errors(score_depths(depths, truths)),
+            "seconds a view": round(seconds / len(views), 2),
+            "times as fast": round(theirs / seconds, 1),
+        }
+        for method, depths, seconds in methods
+    ]
+
+
+def _errors(score: DepthScore) -> Row:
     return {
-        "capture": folder.name,
-        "registered": f"{len(reconstruction.views)}/{len(truth.photos)}",
-        "median error %": round(100 * float(np.median(error)), 3),
-        "within 1 % %": round(100 * float((error < 0.01).mean()), 1),
-        "valid %": round(100 * valid / known, 1),
+        "median error %": round(100 * score.median_relative_error, 3),
+        "within 1 % %": round(100 * score.within_1_percent, 1),
+        "valid %": round(100 * score.valid, 1),
     }
+
+
+def _true_depth(folder: Path, view: View) -> np.ndarray:
+    """Return the true depth at a view's pixels (all 0 where there is no file)."""
+    true = read_true_depth(folder, view.photo)
+    if true is None:
+        return np.zeros(view.depth.shape)
+    return truth_at_view(true, view.K, view.size, view.distortion)
 
 
 def gravity_row(folder: Path, store: Store) -> Row:
@@ -93,14 +124,18 @@ def table(rows: list[Row]) -> str:
     )
 
 
-def _upright(folder: Path, store: Store, *, given: bool) -> tuple[Reconstruction, GravityView]:
+def _registered(folder: Path, *, given: bool) -> list[tuple[Ref, Any]]:
+    """Return references to a capture and its cameras, with their kinds."""
     capture = find_capture(folder, folder / "transforms.json" if given else None)
-    preset = Preset()
-    with run_context(RunContext(store=store, scene=capture.name)):
-        photos = ingest(capture.source, preset.ingest)
-        cameras = register(photos, preset.register)
-        dense = reconstruct(photos, cameras, preset.reconstruct)
-        upright = align_gravity(dense, preset.gravity)
+    photos = ingest(capture.source, Preset().ingest)
+    return [(photos, Capture), (register(photos, Preset().register), SparseModel)]
+
+
+def _upright(folder: Path, store: Store, *, given: bool) -> tuple[Reconstruction, GravityView]:
+    with run_context(RunContext(store=store, scene=folder.name)):
+        (photos, _), (cameras, _) = _registered(folder, given=given)
+        dense = reconstruct(photos, cameras, Preset().reconstruct)
+        upright = align_gravity(dense, Preset().gravity)
         return load(dense, Reconstruction), load(upright, GravityView)
 
 

@@ -12,7 +12,8 @@ from storage import Store
 
 DESCRIPTION = """\
   garden benchmark sample [FOLDER]       the sample capture against its exact truth, end to end
-  garden benchmark depth CAPTURE ...     depth with estimated cameras, after one scale a scene
+  garden benchmark depth CAPTURE ...     depth with estimated cameras, after one scale a scene,
+                                         beside a plain plane sweep: error and time
   garden benchmark gravity CAPTURE ...   gravity with cameras given and with cameras estimated
 
 depth and gravity need captures with cameras.json (and depth/) as truth. Results come from
@@ -33,13 +34,15 @@ def run(options: argparse.Namespace) -> int:
     store = open_store(options)
     if options.name == "sample":
         return _sample(options, store)
-    from flows.benchmark.captures import depth_row, gravity_row, table
+    from flows.benchmark.captures import depth_rows, gravity_row, table
 
-    measure = depth_row if options.name == "depth" else gravity_row
     rows = []
     for capture in options.captures:
         say(f"measuring {capture.name}")
-        rows.append(measure(capture, store))
+        if options.name == "depth":
+            rows += depth_rows(capture, store)
+        else:
+            rows.append(gravity_row(capture, store))
     if options.json:
         print_json({"benchmark": options.name, "rows": rows})
     else:
