@@ -83,6 +83,18 @@ def test_nothing_carries_a_block_without_any_level_surface():
     assert carrier_of(bare, int((np.abs(points.normal[:thing, 1]) < 0.5).sum())) is None
 
 
+def test_a_level_part_that_ends_inside_the_box_does_not_carry():
+    """A block on a slightly larger foot of its own; what that stands on was not seen."""
+    own_foot = block((0.084, 0.03, 0.084), bottom=0.06)
+    thing = block(HALF)
+    assert carrier_of(joined(thing, own_foot), len(thing)) is None
+
+
+def test_a_table_beside_it_does_not_carry():
+    thing = block(HALF)
+    assert carrier_of(joined(thing, level(0.2, centre=(0.36, 0))), len(thing)) is None
+
+
 def test_a_wall_does_not_carry():
     wall = sheet((0, -0.1, 0.09), (0.4, 0, 0), (0, 0.4, 0), (0, 0, -1))
     points, thing = standing()

@@ -88,9 +88,13 @@ def test_what_nobody_claims_is_background(apart):
 
 
 def test_what_lies_below_the_support_is_background(apart):
-    labels = label_nodes(apart.graph, apart.claims)
-    below = apart.graph.cloud.xyz[:, 1] > 0.004
-    assert (labels[below].argmax(1) == 0).all()
+    """A support 3 cm up, as when the thing stands behind something: its foot is not its own."""
+    claim = apart.claims[0]
+    higher = replace(claim.carrier, below=claim.carrier.below + 0.03)
+    labels = label_nodes(apart.graph, (replace(claim, carrier=higher),))
+    below = (higher.below > higher.band) & (apart.truth == 1)
+    assert below.sum() > 50
+    assert (labels[below, 0] == 1).all()
 
 
 def test_boxes_in_another_order_give_the_labels_in_that_order(apart):
@@ -119,10 +123,14 @@ def test_all_views_together_can_turn_a_doubtful_node(apart):
     """Where views agree that a part of the box is not the target, it is less so than before."""
     before = label_nodes(apart.graph, apart.claims)
     lower = apart.claims[0].core & (apart.graph.cloud.xyz[:, 1] > -0.06)
-    votes = Votes(np.where(lower, 0.0, before[:, 1]), np.ones(len(before)))
-    after = label_nodes(apart.graph, apart.claims, votes, before)
-    assert after[lower, 1].mean() < before[lower, 1].mean()
-    assert after[~apart.claims[0].evidence.inside, 1].max() == 0
+
+    def voted(target):
+        votes = Votes(target, np.ones(len(before)))
+        return label_nodes(apart.graph, apart.claims, votes, before)
+
+    against = voted(np.where(lower, 0.0, before[:, 1]))
+    assert against[lower, 1].mean() < voted(before[:, 1])[lower, 1].mean() - 0.05
+    assert against[~apart.claims[0].evidence.inside, 1].max() == 0
 
 
 def test_the_grip_of_a_support_is_full_below_it_and_ends_above_it(apart):
@@ -141,6 +149,7 @@ def test_nearness_is_1_on_the_core_and_falls_with_the_distance():
     near = nearness(xyz, core)
     assert (near[core] == 1).all()
     assert (np.diff(near[~core]) <= 0).all()
+    assert near[~core][0] > 0.5
     assert near[-1] < 1e-3
     np.testing.assert_allclose(nearness(3 * xyz, core), near, atol=1e-9)
     assert (nearness(xyz, np.zeros(101, bool)) == 1).all()
@@ -155,3 +164,10 @@ def test_a_thing_cut_by_its_box_is_less_isolated_than_one_inside(apart):
     cut = replace(claim, evidence=replace(claim.evidence, inside=half), core=claim.core & half)
     assert whole > 0.95
     assert isolation(graph, weights, cut, []) < 0.5 * whole
+
+
+def test_touching_a_rival_does_not_count_against_a_things_isolation():
+    touching = Table(gap=0.0)
+    graph, (own, rival) = touching.graph, touching.claims
+    weights = 1.0 * (np.abs(graph.cloud.xyz[graph.edges][..., 1]) > 0.012).all(1)
+    assert isolation(graph, weights, own, [rival]) > isolation(graph, weights, own, []) + 0.01
