@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -11,15 +11,22 @@ from jaxtyping import Bool, Float
 from garden_models.scene import BadInput, Reconstruction, Target, View
 
 SAMPLES_PER_SIDE = 9
+AT_BORDER = 1.0
+"""Within this many pixels of the picture's border a side of a box is the picture's."""
+BEYOND = 2.0
+"""There the object may go on outside of the picture by this many half boxes."""
 
 
 @dataclass(frozen=True)
 class ViewBox:
-    """A target's box in undistorted working pixels of view ``view``."""
+    """A target's box in undistorted working pixels of view ``view``, whose (width, height)
+    is ``picture``.
+    """
 
     view: int
     low: Float[np.ndarray, "2"]
     high: Float[np.ndarray, "2"]
+    picture: tuple[int, int]
 
     @property
     def size(self) -> Float[np.ndarray, "2"]:
@@ -33,9 +40,22 @@ class ViewBox:
     def contains(
         self, pixels: Float[np.ndarray, "*n 2"], margin: float = 0.0
     ) -> Bool[np.ndarray, "*n"]:
-        """Tell which pixels lie in the box grown by ``margin`` times half its size."""
+        """Tell which pixels lie in the box grown by ``margin`` times half its size; a side
+        on the picture's border may only seem to end there, and is open to ``BEYOND``.
+        """
+        beyond = max(margin, BEYOND)
+        low = np.where(self.low <= AT_BORDER, beyond, margin)
+        high = np.where(self.high >= np.array(self.picture) - AT_BORDER, beyond, margin)
         with np.errstate(invalid="ignore"):
-            return (np.abs(self.relative(pixels)) <= 1 + margin).all(-1)
+            relative = self.relative(pixels)
+            return ((relative >= -1 - low) & (relative <= 1 + high)).all(-1)
+
+    def grown(self, margin: float) -> ViewBox:
+        """Return the box grown by ``margin`` times half its size, within the picture."""
+        step = margin * self.size / 2
+        limit = np.array(self.picture, float)
+        low, high = np.maximum(self.low - step, 0), np.minimum(self.high + step, limit)
+        return replace(self, low=low, high=high)
 
 
 def box_in_view(target: Target, reconstruction: Reconstruction) -> ViewBox:
@@ -61,7 +81,7 @@ def box_in_view(target: Target, reconstruction: Reconstruction) -> ViewBox:
             f"The box of {target.name!r} covers less than two pixels of photo {target.photo!r} "
             f"at the working size; draw a larger box, inside the photo."
         )
-    return ViewBox(index, low, high)
+    return ViewBox(index, low, high, reconstruction.views[index].size)
 
 
 def undistorted_box(

@@ -17,6 +17,8 @@ EMPTY_BOX = 0.05
 """A mask that fills less of its box than this is not what the box was drawn around."""
 CUT_BORDER = 0.1
 """A mask that covers more of the box's border than this is cut off by it."""
+MARGIN = 0.03
+"""Looked at outside of the box by this share of its half: a box may be drawn tightly."""
 UNSURE = 0.25
 """Share of the object's points with a probability near one half that makes it doubtful."""
 DEEP = 2.0
@@ -66,7 +68,7 @@ def judge(
         reasons.append(
             f"The object found in the box of {name!r} fills only {mask.sum() / area:.0%} of it."
         )
-    cut = _border_share(mask, box)
+    cut = _border_share(mask, box.grown(MARGIN))
     if cut > CUT_BORDER:
         reasons.append(
             f"The box of {name!r} may cut the object off: {cut:.0%} of the box's border lies on "

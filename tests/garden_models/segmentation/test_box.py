@@ -88,7 +88,7 @@ def test_a_box_without_area_in_the_picture_is_refused(box):
         box_in_view(Target("cup", "a.jpg", box), reconstruction())
 
 
-BOX = ViewBox(0, np.array([20.0, 30.0]), np.array([100.0, 60.0]))
+BOX = ViewBox(0, np.array([20.0, 30.0]), np.array([100.0, 60.0]), (200, 150))
 
 
 def test_relative_pixels_are_0_in_the_middle_and_1_on_the_border():
@@ -100,3 +100,15 @@ def test_a_margin_grows_the_box_by_shares_of_its_half():
     pixels = np.array([[100.0, 60.0], [103.9, 60.0], [104.1, 60.0], [np.nan, np.nan]])
     assert BOX.contains(pixels).tolist() == [True, False, False, False]
     assert BOX.contains(pixels, 0.1).tolist() == [True, True, False, False]
+
+
+def test_a_side_on_the_pictures_border_is_open_to_what_the_picture_cuts():
+    box = ViewBox(0, np.array([0.0, 30.0]), np.array([100.0, 60.0]), (200, 150))
+    beyond = np.array([[-40.0, 45.0], [-140.0, 45.0], [140.0, 45.0], [50.0, 15.0]])
+    np.testing.assert_array_equal(box.contains(beyond), [True, False, False, False])
+
+
+def test_a_grown_box_stays_in_the_picture():
+    box = ViewBox(0, np.array([1.0, 30.0]), np.array([101.0, 60.0]), (200, 150)).grown(0.1)
+    np.testing.assert_allclose(box.low, [0, 28.5])
+    np.testing.assert_allclose(box.high, [106, 61.5])

@@ -154,3 +154,23 @@ def test_a_box_on_an_unknown_photo_is_refused():
     reconstruction, gravity, _ = room(CRATE)
     with pytest.raises(BadInput, match="is not in the capture"):
         segment(reconstruction, gravity, Target("crate", "other.png", (0, 0, 99, 99)))
+
+
+def test_an_object_that_the_boxs_picture_cuts_is_found_whole_in_the_others():
+    aims = [(0.0, 0.45 if number == 0 else -0.1, 0.0) for number in range(6)]
+    angles = np.radians(np.arange(0, 360, 60))
+    cameras = [
+        look_at((1.2 * np.sin(a), -0.7, -1.2 * np.cos(a)), aim)
+        for a, aim in zip(angles, aims, strict=True)
+    ]
+    scene = RayScene(table_with((CRATE,)), cameras, size=(120, 90), focal=120.0)
+    reconstruction, gravity, labels = render(scene)
+    assert (labels[0][0] == 1).any()
+    masks = segment(reconstruction, gravity, target_box("crate", 1, labels, 0))
+    assert min(overlaps(masks, labels, 1)) >= 0.9
+
+
+def test_a_box_exactly_around_the_object_is_no_reason_to_doubt_it():
+    reconstruction, gravity, labels = room(CRATE)
+    masks = segment(reconstruction, gravity, target_box("crate", 1, labels, 0, loose=0.0))
+    assert masks.verdict.status == "ok"

@@ -50,7 +50,7 @@ class Evidence:
     probability: np.ndarray = field(default_factory=lambda: np.repeat([0.01, 0.99], 100))
 
     def judged(self):
-        box = ViewBox(0, np.array(self.box[:2]), np.array(self.box[2:]))
+        box = ViewBox(0, np.array(self.box[:2]), np.array(self.box[2:]), VIEW.size)
         target = Target("cup", "a.jpg", self.box)
         z = np.linspace(1.0, 1.0 + self.depth, self.points)
         return judge(
@@ -83,7 +83,7 @@ def test_good_evidence_is_ok():
             {"masks": (rectangle(0, 0, 0, 0), *GOOD.masks)},
             "Nothing was found that ends inside",
         ),
-        ({"box": (25.0, 18.0, 52.0, 42.0)}, "may cut the object off: 20%"),
+        ({"box": (25.0, 18.0, 52.0, 42.0)}, "may cut the object off: 18%"),
         ({"probability": np.repeat([0.45, 0.99], [30, 70])}, "uncertain for 30% of its points"),
         ({"depth": 3.0}, "diagonals of its box into the picture"),
         ({"outlined": [Outlined(0.1, 0.5)] * 4}, "agree with its points by only 50%"),

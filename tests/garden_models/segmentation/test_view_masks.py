@@ -101,7 +101,7 @@ def test_a_hole_without_depth_is_filled_by_the_points_and_the_image():
 
 
 def test_outside_of_its_own_box_nothing_is_target():
-    box = ViewBox(0, np.array([40.0, 30.0]), np.array([60.0, 60.0]))
+    box = ViewBox(0, np.array([40.0, 30.0]), np.array([60.0, 60.0]), (999, 999))
     window = window_of(view(), box=box)
     mask = whole(window, labelled(window)[0] > 0.5)
     assert mask[32:58, 42:58].all()
