@@ -25,7 +25,7 @@ VOTE = 0.5
 """The votes of three or more views."""
 ISOLATED = 0.3
 """A node of a connected core that nothing joins to what is outside of the box."""
-COLOUR = 0.1
+COLOUR = 0.05
 """A node's colour, where the labels' colours differ fully."""
 CENTRE = 0.2
 """The nodes in the middle of a box that its view sees, as if all nodes inside and above the
