@@ -13,7 +13,7 @@ from flows.command import EXIT_FAILED, EXIT_OK, print_json
 from flows.command.scene_options import store_path
 
 PACKAGES = (
-    "torch", "prefect", "fastapi", "zarr", "pyarrow", "pycolmap", "mujoco", "open3d", "trimesh",
+    "torch", "prefect", "fastapi", "zarr", "pyarrow", "pycolmap", "mujoco", "trimesh",
     "opencv-python-headless", "coacd",
 )  # fmt: skip
 NEEDED_GB_MEMORY, NEEDED_GB_DISK = 5.0, 2.0

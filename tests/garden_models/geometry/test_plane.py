@@ -8,6 +8,7 @@ import pytest
 from garden_models.geometry.direction import axis_angle_deg
 from garden_models.geometry.plane import find_planes, fit_plane, local_normals
 from garden_models.geometry.rotation import matrix_from_quaternion
+from tests.open3d_library import open3d
 
 
 def patch(rng: np.random.Generator, count: int, size: tuple[float, float]) -> np.ndarray:
@@ -100,3 +101,13 @@ def test_clutter_gives_no_plane() -> None:
 def test_local_normals_of_a_plane() -> None:
     points = patch(np.random.default_rng(0), 500, (1, 1))
     assert np.abs(local_normals(points)[:, 2]).min() > 0.999
+
+
+def test_normals_equal_open3ds() -> None:
+    rng = np.random.default_rng(3)
+    x, y = rng.uniform(-1, 1, (2, 3000))
+    points = np.column_stack([x, y, 0.3 * np.sin(3 * x) * np.cos(2 * y)])
+    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
+    cloud.estimate_normals(open3d.geometry.KDTreeSearchParamKNN(16))
+    cosine = np.einsum("nk,nk->n", local_normals(points, 16), np.asarray(cloud.normals))
+    assert np.abs(cosine).min() > 1 - 1e-6
