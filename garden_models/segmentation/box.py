@@ -48,7 +48,8 @@ class ViewBox:
         high = np.where(self.high >= np.array(self.picture) - AT_BORDER, beyond, margin)
         with np.errstate(invalid="ignore"):
             relative = self.relative(pixels)
-            return ((relative >= -1 - low) & (relative <= 1 + high)).all(-1)
+            inside: Bool[np.ndarray, "*n"] = (relative >= -1 - low) & (relative <= 1 + high)
+        return np.all(inside, axis=-1)
 
     def grown(self, margin: float) -> ViewBox:
         """Return the box grown by ``margin`` times half its size, within the picture."""
