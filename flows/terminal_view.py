@@ -119,4 +119,6 @@ def _remark(event: StepEvent) -> str:
         return event.error
     if event.reasons and event.status != "ok":
         return f"{event.status}: {event.reasons[0]}"
-    return event.why.sentence if event.why else ""
+    # What a step that went well remarks is for the user too: it changed or assumed something.
+    why = (event.why.sentence,) if event.why else ()
+    return "; ".join((*why, *event.reasons))
