@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -62,30 +63,60 @@ def triangulate(
     return pycolmap.triangulate_points(model, database, folder, folder, options=options)
 
 
-def agreement(
+@dataclass(frozen=True)
+class RayMatches:
+    """Verified matches of two photos, as rays (x, y at depth 1) of their given cameras.
+
+    ``focal_px`` is the shorter focal length of the two; ``limit_px`` the epipolar error from
+    which a match contradicts the cameras, both in pixels of the ingested photos.
+    """
+
+    rays_a: Float[np.ndarray, "n 2"]
+    rays_b: Float[np.ndarray, "n 2"]
+    b_from_a: Float[np.ndarray, "4 4"]
+    focal_px: float
+    limit_px: float
+
+
+def ray_matches(
     known: Sequence[KnownCamera], photos: Sequence[Photo], database: Path
-) -> tuple[float, int]:
-    """Return the share of verified matches near their epipolar line, and their number."""
+) -> list[RayMatches]:
+    """Return the verified matches of every pair of photos that has some.
+
+    ``known[i]`` belongs to ``photos[i]``, which has image id i + 1 in the database.
+    """
     cameras = [
         opencv_camera(camera, photo, i + 1)
         for i, (camera, photo) in enumerate(zip(known, photos, strict=True))
     ]
-    agreeing = total = 0
     with pycolmap.Database.open(database) as opened:
         keypoints = [opened.read_keypoints(i + 1)[:, :2] for i in range(len(photos))]
         pair_ids, geometries = opened.read_two_view_geometries()
+    found = []
     for pair_id, geometry in zip(pair_ids, geometries, strict=True):
         i, j = (image_id - 1 for image_id in pycolmap.pair_id_to_image_pair(pair_id))
         matches = geometry.inlier_matches
         if len(matches) == 0:
             continue
-        a = cameras[i].cam_from_img(keypoints[i][matches[:, 0]].astype(np.float64))
-        b = cameras[j].cam_from_img(keypoints[j][matches[:, 1]].astype(np.float64))
-        error = epipolar_error(a, b, relative_pose(known[i], known[j]))
-        focal = min(known[i].K[0, 0], known[j].K[0, 0])
-        limit = MAX_EPIPOLAR_SHARE * max(photos[i].rgb.shape[:2]) / focal
-        agreeing += int((error < limit).sum())
-        total += len(matches)
+        found.append(
+            RayMatches(
+                cameras[i].cam_from_img(keypoints[i][matches[:, 0]].astype(np.float64)),
+                cameras[j].cam_from_img(keypoints[j][matches[:, 1]].astype(np.float64)),
+                relative_pose(known[i], known[j]),
+                float(min(known[i].K[0, 0], known[j].K[0, 0])),
+                MAX_EPIPOLAR_SHARE * max(photos[i].rgb.shape[:2]),
+            )
+        )
+    return found
+
+
+def agreement(pairs: Sequence[RayMatches]) -> tuple[float, int]:
+    """Return the share of verified matches near their epipolar line, and their number."""
+    agreeing = total = 0
+    for pair in pairs:
+        error = epipolar_error(pair.rays_a, pair.rays_b, pair.b_from_a)
+        agreeing += int((error < pair.limit_px / pair.focal_px).sum())
+        total += len(error)
     return (agreeing / total if total else 0.0), total
 
 

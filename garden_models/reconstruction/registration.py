@@ -14,13 +14,19 @@ from pathlib import Path
 import pycolmap
 
 from garden_models.progress import Progress, silent
+from garden_models.reconstruction.focal_correction import (
+    correct_focal,
+    correction_remark,
+    with_focal_factor,
+)
 from garden_models.reconstruction.known_cameras import (
     agreement,
     judge_agreement,
     opencv_camera,
+    ray_matches,
     triangulate,
 )
-from garden_models.reconstruction.registration_config import Registration
+from garden_models.reconstruction.registration_config import FocalTrust, Registration
 from garden_models.reconstruction.registration_database import first_guesses
 from garden_models.reconstruction.registration_evidence import photo_evidence, supported_models
 from garden_models.reconstruction.registration_mapping import map_photos
@@ -33,9 +39,11 @@ from garden_models.reconstruction.sparse_model import sparse_model
 from garden_models.scene import (
     BadInput,
     Capture,
+    KnownCamera,
     RegistrationAttempt,
     Scale,
     SparseModel,
+    Verdict,
 )
 
 WELL_CONNECTED = 50
@@ -52,7 +60,8 @@ def register(
 ) -> SparseModel:
     """Return cameras and sparse points of a capture, in metres under the stated scale.
 
-    With known cameras their poses are kept and only points are found. ``workspace`` is an
+    With known cameras their poses are kept, their focal length too unless the photos
+    contradict it (the verdict says so), and only points are found. ``workspace`` is an
     existing folder for COLMAP's database. What is too weak to go on with has a ``failed``
     verdict, and holds what was found. Raises BadInput for fewer than two photos.
     """
@@ -116,23 +125,49 @@ def register_known(
     started = time.monotonic()
     matcher = PhotoMatcher(photos, config.matching, config.threads, config.seed, workspace)
     matcher.match(config.ladder[0].look, (), progress)
-    cameras = [
-        opencv_camera(k, p, i + 1) for i, (k, p) in enumerate(zip(known, photos, strict=True))
-    ]
-    matcher.write(cameras, range(len(photos)), progress)
+    write_known(matcher, known, progress)
+    remarks: tuple[str, ...] = ()
+    if config.correct_focal:
+        known, remarks = corrected(matcher, known, config.focal, progress)
     progress(0.9, "triangulating points from the given cameras")
     folder = workspace / "known"
     model = triangulate(known, photos, matcher.database, folder, config.seed, config.mapper_threads)
-    share, matches = agreement(known, photos, matcher.database)
+    share, matches = agreement(ray_matches(known, photos, matcher.database))
     tried = attempt("given cameras", [model], time.monotonic() - started)
     note = f"{share:.0%} of {matches} matching points agree with the given cameras"
+    verdict = judge_agreement(share, matches, config.trust).worst(judge_without_camera(without))
     return replace(
         sparse_model(model, photos, GIVEN_SCALE),
         unregistered=without,
-        attempts=(replace(tried, chosen=True, note=note),),
+        attempts=(replace(tried, chosen=True, note="; ".join((note, *remarks))),),
         cameras_source="known",
-        verdict=judge_agreement(share, matches, config.trust).worst(judge_without_camera(without)),
+        verdict=verdict.worst(Verdict("ok", remarks)),
     )
+
+
+def write_known(matcher: PhotoMatcher, known: Sequence[KnownCamera], progress: Progress) -> None:
+    """Write the database of the matcher's photos with their given cameras."""
+    cameras = [
+        opencv_camera(camera, photo, i + 1)
+        for i, (camera, photo) in enumerate(zip(known, matcher.photos, strict=True))
+    ]
+    matcher.write(cameras, range(len(known)), progress)
+
+
+def corrected(
+    matcher: PhotoMatcher, known: Sequence[KnownCamera], trust: FocalTrust, progress: Progress
+) -> tuple[list[KnownCamera], tuple[str, ...]]:
+    """Return the cameras with a focal length that fits the matches, and remarks on it.
+
+    Cameras that fit are returned as they are, without a remark. The others' matches are
+    verified again, for wrong rays had rejected right matches.
+    """
+    correction = correct_focal(ray_matches(known, matcher.photos, matcher.database), trust)
+    if correction is None:
+        return list(known), ()
+    fitting = [with_focal_factor(camera, correction.factor) for camera in known]
+    write_known(matcher, fitting, progress)
+    return fitting, (correction_remark(correction, known, matcher.photos),)
 
 
 def strength(model: pycolmap.Reconstruction) -> tuple[int, int]:
