@@ -21,6 +21,10 @@ from garden_models.scene import KnownCamera, Photo
 
 STEPS = 41
 """Factors tried over the range before the best one is refined."""
+GROUPS = 10
+"""Groups of photos that are left out in turn, at most."""
+AROUND = 1.25
+"""Factor about the best one within which the best without a group is looked for."""
 MOST_MATCHES = 300
 """Matches of a pair that are looked at, evenly chosen: more tell the same."""
 
@@ -40,8 +44,9 @@ def correct_focal(pairs: Sequence[RayMatches], trust: FocalTrust) -> FocalCorrec
     """Return the factor on the focal lengths that explains the matches much better than 1.
 
     ``pairs`` are verified matches as rays of the given cameras. None, and the given cameras
-    stand, where the gain or the change is small, the minority of pairs gains, too few
-    matches have parallax (a camera that only turns), or most contradict any factor.
+    stand, where the gain or the change is small, the factor hangs on single photos, too few
+    pairs gain, too few matches have parallax (a camera that only turns), or most contradict
+    any factor.
     """
     pairs = [_thinned(pair) for pair in pairs if len(pair.rays_a)]
     if not pairs:
@@ -61,11 +66,24 @@ def best_factor(pairs: Sequence[RayMatches], trust: FocalTrust) -> float:
     """Return the factor within ``trust.smallest``..``trust.largest`` of least mean error."""
     tried = np.geomspace(trust.smallest, trust.largest, STEPS)
     best = int(np.argmin([mean_error_px(pairs, factor) for factor in tried]))
-    around = tried[max(best - 1, 0)], tried[min(best + 1, STEPS - 1)]
-    refined = minimize_scalar(
-        lambda factor: mean_error_px(pairs, factor), bounds=around, options={"xatol": 1e-4}
-    )
-    return float(refined.x)
+    return _refined(pairs, tried[max(best - 1, 0)], tried[min(best + 1, STEPS - 1)])
+
+
+def factor_sigma(pairs: Sequence[RayMatches], factor: float) -> float:
+    """Return the standard error of the best factor, by leaving out photos (jackknife).
+
+    Poses err photo by photo, so that the matches of a photo are not independent.
+    """
+    photos = sorted({photo for pair in pairs for photo in pair.photos})
+    count = min(GROUPS, len(photos))
+    factors = []
+    for group in range(count):
+        left_out = set(photos[group::count])
+        kept = [pair for pair in pairs if left_out.isdisjoint(pair.photos)]
+        if not kept:
+            return np.inf
+        factors.append(_refined(kept, factor / AROUND, factor * AROUND))
+    return float(np.sqrt((count - 1) * np.var(factors)))
 
 
 def mean_error_px(pairs: Sequence[RayMatches], factor: float) -> float:
@@ -139,7 +157,17 @@ def _is_significant(found: FocalCorrection, pairs: Sequence[RayMatches], trust: 
     return (
         float(np.mean(gains)) >= trust.pairs_that_gain
         and float(agreeing.mean()) >= trust.agreeing_share
+        and abs(found.factor - 1) >= trust.least_sigmas * factor_sigma(pairs, found.factor)
     )
+
+
+def _refined(pairs: Sequence[RayMatches], smallest: float, largest: float) -> float:
+    found = minimize_scalar(
+        lambda factor: mean_error_px(pairs, factor),
+        bounds=(smallest, largest),
+        options={"xatol": 1e-4},
+    )
+    return float(found.x)
 
 
 def _thinned(pair: RayMatches) -> RayMatches:

@@ -67,10 +67,12 @@ def triangulate(
 class RayMatches:
     """Verified matches of two photos, as rays (x, y at depth 1) of their given cameras.
 
-    ``focal_px`` is the shorter focal length of the two; ``limit_px`` the epipolar error from
-    which a match contradicts the cameras, both in pixels of the ingested photos.
+    ``photos`` are their indices among the known cameras, ``focal_px`` is the shorter focal
+    length of the two, ``limit_px`` the epipolar error from which a match contradicts the
+    cameras, both in pixels of the ingested photos.
     """
 
+    photos: tuple[int, int]
     rays_a: Float[np.ndarray, "n 2"]
     rays_b: Float[np.ndarray, "n 2"]
     b_from_a: Float[np.ndarray, "4 4"]
@@ -100,6 +102,7 @@ def ray_matches(
             continue
         found.append(
             RayMatches(
+                (i, j),
                 cameras[i].cam_from_img(keypoints[i][matches[:, 0]].astype(np.float64)),
                 cameras[j].cam_from_img(keypoints[j][matches[:, 1]].astype(np.float64)),
                 relative_pose(known[i], known[j]),

@@ -95,6 +95,7 @@ class FocalTrust:
 
     least_change: float = 0.03  # of the focal length
     least_gain: float = 0.2  # share of the mean epipolar error that must vanish
+    least_sigmas: float = 4.0  # of the change, over what leaving out photos changes
     pairs_that_gain: float = 0.75  # share of the pairs
     agreeing_share: float = 0.5  # of the matches must then agree with the poses
     fewest_pairs: int = 3  # with parallax

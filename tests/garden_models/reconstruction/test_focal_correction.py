@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from garden_models.geometry.camera import pixel_rays, project
+from garden_models.geometry.rotation import axis_angle
 from garden_models.reconstruction.focal_correction import (
     FocalCorrection,
     correct_focal,
@@ -83,7 +84,7 @@ def rig_matches(
             lost = rng.random(points) < wrong
             partner[lost] = rng.permutation(partner[lost])
             pair = relative_pose(known[i], known[j])
-            found.append(RayMatches(rays[i], rays[j][partner], pair, given_px, 2.56))
+            found.append(RayMatches((i, j), rays[i], rays[j][partner], pair, given_px, 2.56))
     return found
 
 
@@ -122,6 +123,22 @@ def test_few_matches_or_pairs_tell_nothing() -> None:
     assert correct_focal(rig_matches(arc(3), 1.1 * TRUE_PX, points=20), TRUST) is None
     assert correct_focal(rig_matches(arc(2), 1.1 * TRUE_PX), TRUST) is None
     assert correct_focal([], TRUST) is None
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_inexact_poses_are_not_taken_for_a_wrong_focal_length(seed: int) -> None:
+    """Errors of single poses move the best factor, but differently without some photos."""
+    rng = np.random.default_rng(seed)
+    poses = arc(5)
+    matches = rig_matches(poses, TRUE_PX, 0.5)
+    jittered = []
+    for pose in poses:
+        rotation = axis_angle(rng.normal(size=3), np.radians(0.5)) @ pose[:, :3]
+        centre = -pose[:, :3].T @ pose[:, 3] + 0.01 * rng.normal(size=3)
+        jittered.append(np.hstack([rotation, (-rotation @ centre)[:, None]]))
+    known = [KnownCamera(f"{i}.png", np.eye(3), pose) for i, pose in enumerate(jittered)]
+    moved = [replace(m, b_from_a=relative_pose(*(known[k] for k in m.photos))) for m in matches]
+    assert correct_focal(moved, TRUST) is None
 
 
 def test_cameras_of_other_photos_are_not_repaired() -> None:
