@@ -143,13 +143,15 @@ class Camera:
 
 @dataclass(frozen=True)
 class RegistrationAttempt:
-    """One rung of the settings ladder and what came of it."""
+    """One rung of the settings ladder and what came of it; how long it took does not count
+    when results are compared (``unkeyed``).
+    """
 
     name: str
     registered: int
     points: int
     mean_reprojection_px: float
-    seconds: float
+    seconds: float = field(metadata={"unkeyed": True})
     chosen: bool
     note: str = ""
 

@@ -2,7 +2,7 @@
 
 Collins (1996), as commonly written in torch: normalised cross-correlation over fronto-parallel
 planes evenly spaced in inverse depth, the mean over all partners, the best plane wins, and a
-depth is kept where it correlates and two partners agree.
+depth is kept where it correlates and a partner agrees.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ PLANES_AT_ONCE = 8
 LEAST_CORRELATION = 0.5
 AGREEMENT = 0.01
 """Two photos agree where their depths differ by less than this share."""
-AGREEING = 2
 
 
 def plain_plane_sweep(plan: StereoPlan) -> list[Float[np.ndarray, "h w"]]:
@@ -31,11 +30,8 @@ def plain_plane_sweep(plan: StereoPlan) -> list[Float[np.ndarray, "h w"]]:
     raw = {i: _sweep(plan, i) for i in plan.matchable}
     depths = [np.zeros(view.size[::-1]) for view in plan.views]
     for i, depth in raw.items():
-        agreeing = sum(
-            _agrees(plan.views[i], depth, plan.views[j], raw[j]).astype(int)
-            for j in plan.partners[i]
-        )
-        depths[i] = np.where(agreeing >= min(AGREEING, len(plan.partners[i])), depth, 0.0)
+        agreed = [_agrees(plan.views[i], depth, plan.views[j], raw[j]) for j in plan.partners[i]]
+        depths[i] = np.where(np.any(agreed, axis=0), depth, 0.0)
     return depths
 
 
@@ -83,7 +79,10 @@ def _warp(
 
 def _correlation(grey: Float[Tensor, "h w"], warped: Float[Tensor, "d h w"]) -> Tensor:
     def mean(image: Tensor) -> Tensor:
-        return F.avg_pool2d(image[:, None], WINDOW, 1, WINDOW // 2, count_include_pad=False)[:, 0]
+        across = F.avg_pool2d(
+            image[:, None], (1, WINDOW), 1, (0, WINDOW // 2), count_include_pad=False
+        )
+        return F.avg_pool2d(across, (WINDOW, 1), 1, (WINDOW // 2, 0), count_include_pad=False)[:, 0]
 
     own = grey[None]
     own_mean, warped_mean = mean(own), mean(warped)
