@@ -27,7 +27,7 @@ def wall(depth: float, offset: float) -> WorkingView:
 def test_it_finds_a_textured_wall() -> None:
     views = tuple(wall(2.0, offset) for offset in (0.0, 0.15, 0.3))
     partners = {0: (1, 2), 1: (0, 2), 2: (0, 1)}
-    plan = StereoPlan(views, partners, {i: (1 / 4.0, 1 / 1.0) for i in range(3)})
+    plan = StereoPlan(views, partners, dict.fromkeys(range(3), (1 / 4.0, 1 / 1.0)))
     depth = plain_plane_sweep(plan)[1]
     assert (depth > 0).mean() > 0.7
     assert np.median(np.abs(depth[depth > 0] / 2.0 - 1)) < 0.005
