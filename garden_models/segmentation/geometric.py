@@ -22,7 +22,7 @@ from garden_models.scene import (
     Target,
     View,
 )
-from garden_models.segmentation.carrier import Carrier, find_carrier
+from garden_models.segmentation.carrier import BoxEvidence, Carrier, find_carrier
 from garden_models.segmentation.config import Segment
 from garden_models.segmentation.hull import VisualHull, carve
 from garden_models.segmentation.node_graph import NodeGraph, node_graph
@@ -38,6 +38,7 @@ from garden_models.segmentation.region import BoxView, box_evidence, boxes_and_n
 from garden_models.segmentation.scene_in_gv import SceneInGV, scene_in_gv
 from garden_models.segmentation.support import support_of
 from garden_models.segmentation.tidy import tidy_mask
+from garden_models.segmentation.tight_box import widened
 from garden_models.segmentation.verdict import judge
 from garden_models.segmentation.view_masks import (
     ViewWindow,
@@ -86,7 +87,7 @@ def segment(
         colour_sigma=config.colour_sigma,
         crease_deg=config.crease_deg,
     )
-    candidates = tuple(_candidate(graph, box, config) for box in boxes)
+    boxes, candidates = zip(*(_candidate(graph, box, config) for box in boxes), strict=True)
     progress(0.15, "dividing points")
     labels = label_nodes(graph, candidates)
     refined = _refined(scene, boxes[0], graph, candidates, labels, config, progress)
@@ -117,8 +118,27 @@ def segment(
     )
 
 
-def _candidate(graph: NodeGraph, one: BoxView, config: Segment) -> Candidate:
-    """Return a box's claim on the nodes."""
+def _candidate(graph: NodeGraph, one: BoxView, config: Segment) -> tuple[BoxView, Candidate]:
+    """Return a box, widened where it is a little too small, and its claim on the nodes."""
+    evidence, carrier = _carried(graph, one, config)
+    if carrier is not None:
+        wider = widened(graph, one, carrier, config.box_margin)
+        if wider is not one:
+            one = wider
+            evidence, carrier = _carried(graph, one, config)
+    if carrier is not None:
+        core = carrier.core
+    else:
+        parts = graph.components(evidence.inside)
+        share = np.bincount(parts[evidence.inside], evidence.central[evidence.inside], 1)
+        core = (parts == int(share.argmax())) & evidence.inside
+    centrality = np.where(evidence.inside, one.centrality(one.project(graph.cloud.xyz)), 0.0)
+    near = nearness(graph.cloud.xyz, core)
+    return one, Candidate(evidence, centrality, carrier, core, near)
+
+
+def _carried(graph: NodeGraph, one: BoxView, config: Segment) -> tuple[BoxEvidence, Carrier | None]:
+    """Return what a box says of the nodes, and what carries the thing in it."""
     evidence = box_evidence(graph.cloud, one, config.box_margin)
     carrier = find_carrier(
         graph,
@@ -127,14 +147,7 @@ def _candidate(graph: NodeGraph, one: BoxView, config: Segment) -> Candidate:
         band_sigma=config.band_sigma,
         min_score=config.min_support_score,
     )
-    if carrier is not None:
-        core = carrier.core
-    else:
-        parts = graph.components(evidence.inside)
-        share = np.bincount(parts[evidence.inside], evidence.central[evidence.inside], 1)
-        core = (parts == int(share.argmax())) & evidence.inside
-    centrality = np.where(evidence.inside, one.centrality(one.project(graph.cloud.xyz)), 0.0)
-    return Candidate(evidence, centrality, carrier, core, nearness(graph.cloud.xyz, core))
+    return evidence, carrier
 
 
 def _refined(
