@@ -8,7 +8,7 @@ import os
 import time
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from storage import _os
@@ -31,8 +31,12 @@ def staging_folder(store: Path, *, durable: bool) -> Iterator[Path]:
         inner = outer / "stage"
         _os.active.mkdir(inner)
         yield inner
-    finally:
-        _os.remove_tree(outer)
+    except BaseException:
+        # What went wrong is what the caller must hear of; ``sweep`` removes what is left.
+        with suppress(OSError):
+            _os.remove_tree(outer)
+        raise
+    _os.remove_tree(outer)
 
 
 def sweep(store: Path) -> int:

@@ -94,7 +94,7 @@ def session_rss(session: int) -> int:
 
 def _session_of(pid: str) -> int:
     try:
-        status = Path(f"/proc/{pid}/stat").read_text()
-    except OSError:
+        status = Path(f"/proc/{pid}/stat").read_bytes()  # a name may be of any bytes
+        return int(status[status.rindex(b")") + 2 :].split()[3])
+    except (OSError, IndexError, ValueError):
         return -1
-    return int(status[status.rindex(")") + 2 :].split()[3])

@@ -29,7 +29,7 @@ def test_ctrl_c_keeps_what_was_finished(tmp_path: Path) -> None:
     time.sleep(2.0)
     process.send_signal(signal.SIGINT)
     said = process.stderr.read()
-    assert process.wait(timeout=60) == 130
+    assert process.wait(timeout=60) == 130, said
     assert "goes on from there" in said
     plan = subprocess.run(
         [*base, "plan", *shared, "--json"], capture_output=True, text=True, check=True,
