@@ -107,6 +107,8 @@ def _stopping(context: RunContext) -> Iterator[None]:
     with contextlib.ExitStack() as stack:
         for number in (signal.SIGINT, signal.SIGTERM):
             previous = signal.getsignal(number)
+            if previous == signal.SIG_IGN:
+                continue  # a shell's background job: Ctrl-C is meant for others
             stack.callback(signal.signal, number, previous)
             signal.signal(number, _stopper(context, previous))
         yield

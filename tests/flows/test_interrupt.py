@@ -12,15 +12,25 @@ from pathlib import Path
 
 import pytest
 
+FOREGROUND_GARDEN = """
+import signal, sys
+from flows.command import main
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.exit(main())
+"""
+"""A shell has its background jobs, and so perhaps these tests, ignore Ctrl-C."""
+
 CORNER = Path(__file__).parents[1] / "scenes" / "corner"
 
 
 @pytest.mark.slow
 def test_ctrl_c_keeps_what_was_finished(tmp_path: Path) -> None:
-    base = [sys.executable, "-c", "import sys; from flows.command import main; sys.exit(main())"]
+    base = [sys.executable, "-c", FOREGROUND_GARDEN]
     shared = [str(CORNER), "--store", str(tmp_path / "store"), "--out", str(tmp_path / "scenes")]
     process = subprocess.Popen(
-        [*base, "factorize", *shared, "--engine", "local"], stderr=subprocess.PIPE, text=True
+        [*base, "factorize", *shared, "--engine", "local"],
+        stderr=subprocess.PIPE,
+        text=True,
     )
     assert process.stderr is not None
     for line in process.stderr:

@@ -85,10 +85,11 @@ def test_the_memory_limit_holds(store: Store) -> None:
 
 
 PARENT = """
-import sys
+import signal, sys
 from storage import Store
 from tasks.step import RunContext, run_context
 from tests.tasks.step.toy import dawdle
+signal.signal(signal.SIGINT, getattr(signal, sys.argv[4]))
 with run_context(RunContext(Store.open(sys.argv[1]), "room")):
     if sys.argv[3] == "submit":
         dawdle.submit(sys.argv[2]).result()
@@ -111,7 +112,7 @@ def test_children_end_with_their_run(
     marker = tmp_path / "pid"
     environment = os.environ | {"PYTHONPATH": ":".join(sys.path)}
     parent = subprocess.Popen(
-        [sys.executable, "-c", PARENT, str(store.path), str(marker), how],
+        [sys.executable, "-c", PARENT, str(store.path), str(marker), how, "default_int_handler"],
         env=environment,
         stderr=subprocess.DEVNULL,
     )
@@ -121,6 +122,24 @@ def test_children_end_with_their_run(
         parent.send_signal(number)
         wait_for(lambda: not alive(child))
         assert parent.wait(60.0) != 0
+    finally:
+        parent.kill()
+
+
+def test_ctrl_c_for_others_does_not_stop_a_background_job(store: Store, tmp_path: Path) -> None:
+    """A shell has its background jobs ignore it."""
+    marker = tmp_path / "pid"
+    parent = subprocess.Popen(
+        [sys.executable, "-c", PARENT, str(store.path), str(marker), "call", "SIG_IGN"],
+        env=os.environ | {"PYTHONPATH": ":".join(sys.path)},
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        wait_for(lambda: marker.exists() and marker.read_text())
+        parent.send_signal(signal.SIGINT)
+        time.sleep(0.5)
+        assert alive(int(marker.read_text()))
+        assert parent.poll() is None
     finally:
         parent.kill()
 
