@@ -1,4 +1,4 @@
-"""Keep what was done: one record an action key, created by link, first writer wins.
+"""Keep what was done: one record an action key, created at once, first writer wins.
 
 A record says which object came out, what went into its key (so that the next run can say
 what changed), and what it cost. ``latest/`` points from (scene, step, label) to the newest
@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from storage import _os
 from storage.digest import digest_bytes, digest_value, hexadecimal
+
+if TYPE_CHECKING:
+    from storage.medium import Medium
 
 FORMAT = 1
 
@@ -77,127 +77,96 @@ class ActionRecord:
         return contents == {name: output.content for name, output in other.outputs.items()}
 
 
-def action_path(store: Path, key: str) -> Path:
-    """Return where the record of this key stands."""
+def action_name(key: str) -> str:
+    """Return the name of the document that holds the record of this key."""
     name = hexadecimal(key)
-    return store / "actions" / name[:2] / f"{name[2:]}.json"
+    return f"actions/{name[:2]}/{name[2:]}.json"
 
 
-def read_action(store: Path, key: str) -> ActionRecord | None:
+def read_action(medium: Medium, key: str) -> ActionRecord | None:
     """Return the record of a key; None if there is none, or none that can be read."""
+    data = medium.read(action_name(key))
     try:
-        record = ActionRecord.from_bytes(action_path(store, key).read_bytes())
-    except (FileNotFoundError, ValueError, KeyError):
+        record = None if data is None else ActionRecord.from_bytes(data)
+    except (ValueError, KeyError):
         return None
-    return record if record.key == key else None
+    return record if record is not None and record.key == key else None
 
 
-def create_action(
-    store: Path, record: ActionRecord, staged: Path, *, durable: bool
-) -> ActionRecord:
+def create_action(medium: Medium, record: ActionRecord) -> ActionRecord:
     """Publish a record and return the one that counts: the first of its key.
 
     If another writer was first and found other contents, ours is kept under
     ``conflicts/`` as evidence that the step is not deterministic.
     """
-    path = action_path(store, record.key)
-    _os.ensure_folder(path.parent, durable=durable)
-    draft = staged / f"action-{uuid.uuid4().hex}.json"
-    _write(draft, record.to_bytes(), durable=durable)
+    name = action_name(record.key)
     for _attempt in range(3):
-        try:
-            _os.active.link(draft, path)
-        except FileExistsError:
-            winner = read_action(store, record.key)
-            if winner is None:
-                delete_action(store, record.key)  # unreadable: no record at all
-                continue
-            if not winner.same_outputs(record):
-                _keep_conflict(store, record, draft, durable=durable)
-            return winner
-        if durable:
-            _os.active.fsync(path.parent)
-        return record
-    raise OSError(f"cannot create the action record {path}")
+        if medium.create(name, record.to_bytes()):
+            return record
+        winner = read_action(medium, record.key)
+        if winner is None:
+            medium.delete(name)  # unreadable: no record at all
+            continue
+        if not winner.same_outputs(record):
+            _keep_conflict(medium, record)
+        return winner
+    raise OSError(f"cannot create the action record {name}")
 
 
-def _keep_conflict(store: Path, record: ActionRecord, draft: Path, *, durable: bool) -> None:
+def _keep_conflict(medium: Medium, record: ActionRecord) -> None:
     name = hexadecimal(record.key)
     outcome = hexadecimal(digest_bytes(record.to_bytes()))[:16]
-    place = store / "conflicts" / name[:2] / f"{name[2:]}-{outcome}.json"
-    _os.ensure_folder(place.parent, durable=durable)
-    try:
-        _os.active.link(draft, place)
-    except FileExistsError:
-        return
-    if durable:
-        _os.active.fsync(place.parent)
+    medium.create(f"conflicts/{name[:2]}/{name[2:]}-{outcome}.json", record.to_bytes())
 
 
-def delete_action(store: Path, key: str) -> None:
+def delete_action(medium: Medium, key: str) -> None:
     """Forget an action; its object is not touched."""
-    try:
-        _os.active.unlink(action_path(store, key))
-    except FileNotFoundError:
-        return
+    medium.delete(action_name(key))
 
 
-def all_actions(store: Path) -> Iterator[ActionRecord]:
+def all_actions(medium: Medium) -> Iterator[ActionRecord]:
     """Give every readable record, in no particular order."""
-    for path in all_action_paths(store):
+    for name in medium.names("actions/"):
+        data = medium.read(name)
         try:
-            yield ActionRecord.from_bytes(path.read_bytes())
-        except (FileNotFoundError, ValueError, KeyError):
+            if data is not None:
+                yield ActionRecord.from_bytes(data)
+        except (ValueError, KeyError):
             continue
 
 
-def all_action_paths(store: Path) -> Iterator[Path]:
-    """Give the path of every record."""
-    yield from (store / "actions").glob("??/*.json")
-
-
-def latest_path(store: Path, scene: str, step: str, label: str) -> Path:
-    """Return where the pointer to the newest action of a scene's step stands."""
-    shelf = hexadecimal(digest_value(scene, domain="garden.scene/1"))[:24]
+def latest_name(scene: str, step: str, label: str) -> str:
+    """Return the name of the pointer to the newest action of a scene's step."""
     name = hexadecimal(digest_value((step, label), domain="garden.latest/1"))[:24]
-    return store / "latest" / shelf / f"{name}.json"
+    return f"{_latest_shelf(scene)}{name}.json"
 
 
-def point_to_latest(
-    store: Path, staged: Path, *, scene: str, step: str, label: str, key: str
-) -> None:
+def _latest_shelf(scene: str) -> str:
+    return f"latest/{hexadecimal(digest_value(scene, domain='garden.scene/1'))[:24]}/"
+
+
+def point_to_latest(medium: Medium, *, scene: str, step: str, label: str, key: str) -> None:
     """Remember ``key`` as the newest action of (scene, step, label)."""
-    path = latest_path(store, scene, step, label)
-    _os.ensure_folder(path.parent, durable=False)
-    draft = staged / f"latest-{uuid.uuid4().hex}.json"
     document = {"key": key, "label": label, "scene": scene, "step": step}
-    _os.active.write(draft, json.dumps(document, sort_keys=True).encode())
-    _os.active.rename(draft, path)
+    medium.replace(latest_name(scene, step, label), json.dumps(document, sort_keys=True).encode())
 
 
-def latest_key(store: Path, scene: str, step: str, label: str) -> str | None:
+def latest_key(medium: Medium, scene: str, step: str, label: str) -> str | None:
     """Return the key that ``point_to_latest`` remembered, if any."""
-    return _pointer(latest_path(store, scene, step, label)).get("key")
+    return _pointer(medium, latest_name(scene, step, label)).get("key")
 
 
-def latest_of_scene(store: Path, scene: str) -> Iterator[tuple[str, str, str]]:
+def latest_of_scene(medium: Medium, scene: str) -> Iterator[tuple[str, str, str]]:
     """Give (step, label, key) of every step that ran for ``scene``."""
-    for path in sorted(latest_path(store, scene, "", "").parent.glob("*.json")):
-        pointer = _pointer(path)
+    for name in medium.names(_latest_shelf(scene)):
+        pointer = _pointer(medium, name)
         if pointer:
             yield pointer["step"], pointer["label"], pointer["key"]
 
 
-def _pointer(path: Path) -> dict[str, str]:
+def _pointer(medium: Medium, name: str) -> dict[str, str]:
     try:
-        document = json.loads(path.read_bytes())
+        document = json.loads(medium.read(name) or b"{}")
     except (OSError, ValueError):
         return {}
     return document if isinstance(document, dict) else {}
-
-
-def _write(path: Path, data: bytes, *, durable: bool) -> None:
-    _os.active.write(path, data)
-    _os.active.chmod(path, 0o444)
-    if durable:
-        _os.active.fsync(path)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from storage import objects
-from storage.actions import ActionRecord, all_action_paths
+from storage.actions import ActionRecord
 from storage.errors import CorruptArtifact, MissingArtifact
-from storage.objects import Level
+from storage.medium import Level, Medium
 
 
 @dataclass(frozen=True)
@@ -19,31 +18,34 @@ class Problem:
     what: str
 
 
-def check_store(store: Path, level: Level) -> list[Problem]:
+def check_store(medium: Medium, level: Level) -> list[Problem]:
     """Return every damaged object, and every action that is unreadable or dangles."""
     problems: list[Problem] = []
     whole: set[str] = set()
-    for digest in objects.all_objects(store):
+    for digest in medium.objects():
         try:
-            objects.verify(store, digest, level)
+            objects.verify(medium, digest, level)
             whole.add(digest)
         except (CorruptArtifact, MissingArtifact, ValueError) as error:
             problems.append(Problem(digest, str(error)))
-    for path in all_action_paths(store):
-        problems += _action_problems(path, whole)
+    for name in medium.names("actions/"):
+        problems += _action_problems(medium, name, whole)
     return problems
 
 
-def _action_problems(path: Path, whole: set[str]) -> list[Problem]:
+def _action_problems(medium: Medium, name: str, whole: set[str]) -> list[Problem]:
+    data = medium.read(name)
+    if data is None:
+        return []  # forgotten meanwhile
     try:
-        record = ActionRecord.from_bytes(path.read_bytes())
-    except (ValueError, KeyError, OSError) as error:
-        return [Problem(str(path), f"unreadable action record: {error}")]
-    name = f"b3:{path.parent.name}{path.stem}"
-    if record.key != name:
-        return [Problem(name, "the action record names another key")]
+        record = ActionRecord.from_bytes(data)
+    except (ValueError, KeyError) as error:
+        return [Problem(name, f"unreadable action record: {error}")]
+    key = "b3:" + name.removeprefix("actions/").removesuffix(".json").replace("/", "")
+    if record.key != key:
+        return [Problem(key, "the action record names another key")]
     return [
-        Problem(name, f"its output {output.object[:15]} is missing or damaged")
+        Problem(key, f"its output {output.object[:15]} is missing or damaged")
         for output in record.outputs.values()
         if output.object not in whole
     ]

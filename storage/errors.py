@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-from pathlib import Path
 
 
 class StoreError(Exception):
@@ -51,7 +50,7 @@ _FULL = {errno.ENOSPC, errno.EDQUOT}
 _READ_ONLY = {errno.EROFS, errno.EACCES, errno.EPERM}
 
 
-def explain_os_error(error: OSError, store: Path) -> StoreError | None:
+def explain_os_error(error: OSError, store: str) -> StoreError | None:
     """Return the store's own error for a full or read-only disk, else None."""
     if error.errno in _FULL:
         return StoreFull(

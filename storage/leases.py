@@ -1,26 +1,20 @@
 """Let one worker at a time do an action, and let the others take over when it dies.
 
-A lease is a file created by link. It names its owner and when it ends; a thread renews it
-while the work goes on. A lease is void when it has ended or when its owner is surely dead
-(invariant LOCKS-DIE-WITH-OWNERS). Changes to an existing lease are made under one
-advisory lock, held for microseconds, that the system drops with its owner.
+A lease names its owner and when it ends; a thread renews it while the work goes on. It is
+void when it has ended or when its owner is surely dead (invariant LOCKS-DIE-WITH-OWNERS).
 """
 
 from __future__ import annotations
 
 import dataclasses
-import fcntl
 import json
-import os
 import threading
 import time
 import uuid
-from collections.abc import Iterator
-from contextlib import contextmanager
+from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
-from storage import _os
 from storage.digest import hexadecimal
 from storage.owner import Owner
 
@@ -55,35 +49,48 @@ class Lease:
         return time.time() >= self.expires_at or self.owner.is_dead()
 
 
-class LeaseTable:
-    """The leases of one store, and those that this process holds."""
+Accepts = Callable[[Lease | None], bool]
 
-    def __init__(self, store: Path, seconds: float = LEASE_S) -> None:
-        self._folder = store / "leases"
-        self._seconds = seconds
+
+class LeaseTable(ABC):
+    """The leases of one store, and those that this process holds and renews."""
+
+    def __init__(self, seconds: float = LEASE_S) -> None:
+        self.seconds = seconds
         self._held: dict[str, Lease] = {}
         self._guard = threading.Lock()
         self._renewer: threading.Thread | None = None
 
+    @abstractmethod
+    def _create(self, lease: Lease) -> bool:
+        """Write a lease where there is none; False if there is one."""
+
+    @abstractmethod
+    def _exchange(self, key: str, accepts: Accepts, new: Lease | None) -> bool:
+        """In one step: if ``accepts`` what stands there, put ``new`` in its place, or nothing.
+
+        A lease that cannot be read counts as none.
+        """
+
+    @abstractmethod
+    def _read(self, key: str) -> Lease | None:
+        """Return the lease for ``key``, valid or not; None if there is none."""
+
     def try_acquire(self, key: str) -> Lease | None:
         """Return a lease for ``key``, or None while somebody else holds it."""
-        _os.ensure_folder(self._folder, durable=False)
-        lease = Lease(key, uuid.uuid4().hex, Owner.here(), time.time() + self._seconds)
-        if self._create(lease) or self._replace_void(lease):
-            with self._guard:
-                self._held[key] = lease
-                self._start_renewer()
-            return lease
-        return None
+        lease = Lease(key, uuid.uuid4().hex, Owner.here(), time.time() + self.seconds)
+        if not (self._create(lease) or self._exchange(key, _is_free, lease)):
+            return None
+        with self._guard:
+            self._held[key] = lease
+            self._start_renewer()
+        return lease
 
     def release(self, lease: Lease) -> None:
         """Give a lease back; nothing happens if it was taken over meanwhile."""
         with self._guard:
             self._held.pop(lease.key, None)
-        with self._locked():
-            current = self._read(lease.key)
-            if current is not None and current.token == lease.token:
-                _os.active.unlink(self._path(lease.key))
+        self._exchange(lease.key, _is(lease), None)
 
     def abandon_all(self) -> None:
         """Stop renewing what this table holds; the leases end by themselves."""
@@ -95,49 +102,6 @@ class LeaseTable:
         lease = self._read(key)
         return None if lease is None or lease.is_void() else lease
 
-    def _path(self, key: str) -> Path:
-        return self._folder / f"{hexadecimal(key)}.json"
-
-    def _read(self, key: str) -> Lease | None:
-        try:
-            return Lease.from_bytes(self._path(key).read_bytes())
-        except (FileNotFoundError, ValueError):
-            return None
-
-    def _create(self, lease: Lease) -> bool:
-        draft = self._draft(lease)
-        try:
-            _os.active.link(draft, self._path(lease.key))
-        except FileExistsError:
-            return False
-        finally:
-            _os.active.unlink(draft)
-        return True
-
-    def _replace_void(self, lease: Lease) -> bool:
-        with self._locked():
-            current = self._read(lease.key)
-            if current is not None and not current.is_void():
-                return False
-            _os.active.rename(self._draft(lease), self._path(lease.key))
-            return True
-
-    def _draft(self, lease: Lease) -> Path:
-        drafts = self._folder.parent / "tmp"
-        _os.ensure_folder(drafts, durable=False)
-        draft = drafts / f"{lease.token}-{uuid.uuid4().hex}.lease"
-        _os.active.write(draft, lease.to_bytes())
-        return draft
-
-    @contextmanager
-    def _locked(self) -> Iterator[None]:
-        descriptor = os.open(self._folder / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
-            yield
-        finally:
-            os.close(descriptor)
-
     def _start_renewer(self) -> None:
         if self._renewer is None or not self._renewer.is_alive():
             self._renewer = threading.Thread(target=self._renew, name="leases", daemon=True)
@@ -145,22 +109,28 @@ class LeaseTable:
 
     def _renew(self) -> None:
         while True:
-            time.sleep(self._seconds / 3)
+            time.sleep(self.seconds / 3)
             with self._guard:
                 held = list(self._held.values())
                 if not held:
                     self._renewer = None
                     return
             for lease in held:
-                self._extend(lease)
+                longer = dataclasses.replace(lease, expires_at=time.time() + self.seconds)
+                try:
+                    self._exchange(lease.key, _is(lease), longer)
+                except OSError:
+                    continue  # the next renewal tries again; at worst the lease ends
 
-    def _extend(self, lease: Lease) -> None:
-        with self._locked():
-            current = self._read(lease.key)
-            if current is None or current.token != lease.token:
-                return
-            try:
-                longer = dataclasses.replace(lease, expires_at=time.time() + self._seconds)
-                _os.active.rename(self._draft(longer), self._path(lease.key))
-            except OSError:
-                return  # the next renewal tries again; at worst the lease ends
+
+def lease_name(key: str) -> str:
+    """Return the name of the document that holds the lease for ``key``."""
+    return f"leases/{hexadecimal(key)}.json"
+
+
+def _is_free(current: Lease | None) -> bool:
+    return current is None or current.is_void()
+
+
+def _is(lease: Lease) -> Accepts:
+    return lambda current: current is not None and current.token == lease.token

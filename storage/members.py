@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from storage import _os
 from storage.digest import digest_bytes
 from storage.errors import CorruptArtifact
 from storage.manifest import Manifest, Member
+
+if TYPE_CHECKING:
+    from storage.medium import Medium
 
 _SYNCING_THREADS = 8
 
@@ -18,8 +21,9 @@ _SYNCING_THREADS = 8
 class MemberWriter:
     """Collect the members of an object in a staging folder (thread-safe)."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, durable: bool) -> None:
         self.folder = folder
+        self._durable = durable
         self.members: dict[str, Member] = {}
         self._guard = threading.Lock()
 
@@ -34,6 +38,8 @@ class MemberWriter:
 
     def sync(self) -> None:
         """Make all members durable; at once, since the disk then waits only once for many."""
+        if not self._durable:
+            return
         paths = [self.folder / path for path in self.members]
         with ThreadPoolExecutor(_SYNCING_THREADS, "fsync") as pool:
             list(pool.map(_os.active.fsync, paths))
@@ -42,10 +48,10 @@ class MemberWriter:
 class MemberReader:
     """Read the members of a published object; what differs from the manifest raises."""
 
-    def __init__(self, folder: Path, digest: str, manifest: Manifest) -> None:
+    def __init__(self, medium: Medium, digest: str, manifest: Manifest) -> None:
         self.digest = digest
         self.manifest = manifest
-        self._folder = folder
+        self._medium = medium
         self._hashed: set[str] = set()
 
     def __contains__(self, path: str) -> bool:
@@ -60,10 +66,7 @@ class MemberReader:
         member = self.manifest.members.get(path)
         if member is None:
             raise CorruptArtifact(self.digest, f"{path} is no member")
-        try:
-            data = (self._folder / path).read_bytes()
-        except OSError as error:
-            raise CorruptArtifact(self.digest, f"member {path} cannot be read") from error
+        data = self._read(path, 0, None)
         if len(data) != member.size or digest_bytes(data) != member.digest:
             raise CorruptArtifact(self.digest, f"member {path} has changed")
         self._hashed.add(path)
@@ -86,14 +89,15 @@ class MemberReader:
         """
         member = self.manifest.members[path]
         stop = min(stop, member.size)
-        try:
-            descriptor = os.open(self._folder / path, os.O_RDONLY | os.O_CLOEXEC)
-        except OSError as error:
-            raise CorruptArtifact(self.digest, f"member {path} cannot be read") from error
-        try:
-            data = os.pread(descriptor, stop - start, start)
-        finally:
-            os.close(descriptor)
+        data = self._read(path, start, stop)
         if len(data) != stop - start:
             raise CorruptArtifact(self.digest, f"member {path} is too short")
         return data
+
+    def _read(self, path: str, start: int, stop: int | None) -> bytes:
+        try:
+            return self._medium.read_member(self.digest, path, start, stop)
+        except (ConnectionError, TimeoutError):
+            raise
+        except OSError as error:
+            raise CorruptArtifact(self.digest, f"member {path} cannot be read") from error

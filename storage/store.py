@@ -1,33 +1,33 @@
 """Open a store, publish into it, look up and read from it.
 
-The layout of a store's folder and the order of every write follow ``INVARIANTS.md``.
+What a store promises and how it is laid out stands in ``INVARIANTS.md``.
 """
 
 from __future__ import annotations
 
-import fcntl
 import json
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
-from storage import _os, actions, objects, staging
+from storage import actions, objects
 from storage.actions import ActionRecord
 from storage.check import Problem, check_store
 from storage.errors import (
     CorruptArtifact,
     MissingArtifact,
+    StoreError,
     StoreFormatError,
     StoreFull,
     StoreMissing,
-    explain_os_error,
 )
+from storage.folder import FolderMedium
 from storage.leases import LEASE_S, Lease, LeaseTable
 from storage.manifest import Manifest
-from storage.members import MemberReader, MemberWriter
-from storage.objects import Level, Published
+from storage.medium import Level, Medium
+from storage.members import MemberReader
+from storage.objects import Published
 from storage.search import matches
 
 FORMAT = 1
@@ -38,36 +38,26 @@ T = TypeVar("T")
 
 
 class Store:
-    """An artifact store in a folder. Safe for many threads and processes at once."""
+    """An artifact store in a folder or a bucket. Safe for many threads and processes at once."""
 
-    def __init__(
-        self,
-        path: Path,
-        *,
-        durability: Literal["full", "none"] = "full",
-        verify: Level = "manifest",
-        lease_s: float = LEASE_S,
-    ) -> None:
-        self.path = path
-        self.durable = durability == "full"
+    def __init__(self, medium: Medium, *, verify: Level = "manifest") -> None:
+        self.medium = medium
         self.verify_level: Level = verify
-        self.leases = LeaseTable(path, lease_s)
-        self._swept = False
 
     @classmethod
     def open(
         cls,
-        path: str | Path,
+        address: str | Path,
         *,
         create: bool = True,
         durability: Literal["full", "none"] = "full",
         verify: Level = "manifest",
         lease_s: float = LEASE_S,
     ) -> Store:
-        """Open the store at ``path``; make a new one there if ``create``.
+        """Open the store at ``address``; make a new one there if ``create``.
 
         Args:
-            path: the store's folder.
+            address: the store's folder.
             create: whether to make a new store if there is none.
             durability: ``none`` skips fsync (for tests).
             verify: how thoroughly a hit is checked before it counts.
@@ -78,45 +68,63 @@ class Store:
             StoreFormatError: the folder holds something else, or an unknown format.
             StoreFull, StoreReadOnly: it cannot be made there.
         """
-        place = Path(path).expanduser().absolute()
-        store = cls(place, durability=durability, verify=verify, lease_s=lease_s)
-        if not (place / _MARKER).exists():
+        medium = FolderMedium(
+            Path(address).expanduser().absolute(), durable=durability == "full", lease_s=lease_s
+        )
+        store = cls(medium, verify=verify)
+        if not (medium.path / _MARKER).exists():
             if not create:
                 raise StoreMissing(
-                    f"there is no store at {place}: give its folder with --store or GARDEN_STORE"
+                    f"there is no store at {medium.address}: give its folder with --store or"
+                    " GARDEN_STORE"
                 )
-            store._create()
+            store._create(medium)
         store._check_format()
         return store
 
-    def _create(self) -> None:
+    @property
+    def address(self) -> str:
+        """How a user, or another process, names this store."""
+        return self.medium.address
+
+    @property
+    def path(self) -> Path:
+        """The store's folder; StoreError for a store in a bucket."""
+        return self._folder_medium().path
+
+    @property
+    def durable(self) -> bool:
+        """Whether what is published is synchronised to the disk before it counts."""
+        return getattr(self.medium, "durable", True)
+
+    @property
+    def leases(self) -> LeaseTable:
+        """Who computes which key."""
+        return self.medium.leases
+
+    def _folder_medium(self) -> FolderMedium:
+        if not isinstance(self.medium, FolderMedium):
+            raise StoreError(f"the store {self.address} is not in a folder")
+        return self.medium
+
+    def _create(self, medium: FolderMedium) -> None:
+        path = medium.path
         document = json.dumps({"format": FORMAT, "hash": HASH}, sort_keys=True).encode()
         with self._explained():
-            present = {p.name for p in self.path.iterdir()} if self.path.is_dir() else set()
+            present = {p.name for p in path.iterdir()} if path.is_dir() else set()
             if present - {"tmp", _MARKER}:
-                raise StoreFormatError(
-                    f"{self.path} is not empty and no store: choose an empty folder"
-                )
-            _os.ensure_folder(self.path, durable=self.durable)
-            with staging.staging_folder(self.path, durable=self.durable) as staged:
-                _os.active.write(staged / _MARKER, document)
-                if self.durable:
-                    _os.active.fsync(staged / _MARKER)
-                try:
-                    _os.active.link(staged / _MARKER, self.path / _MARKER)
-                except FileExistsError:
-                    return
-            if self.durable:
-                _os.active.fsync(self.path)
+                raise StoreFormatError(f"{path} is not empty and no store: choose an empty folder")
+            medium.prepare()
+            medium.create(_MARKER, document)
 
     def _check_format(self) -> None:
         try:
-            document = json.loads((self.path / _MARKER).read_bytes())
+            document = json.loads(self.medium.read(_MARKER) or b"")
         except (OSError, ValueError) as error:
-            raise StoreFormatError(f"{self.path / _MARKER} cannot be read: {error}") from error
+            raise StoreFormatError(f"{self.address}/{_MARKER} cannot be read: {error}") from error
         if document != {"format": FORMAT, "hash": HASH}:
             raise StoreFormatError(
-                f"the store {self.path} is of format {document}, this version knows only"
+                f"the store {self.address} is of format {document}, this version knows only"
                 f" format {FORMAT} with {HASH}: use the version that made it, or another store"
             )
 
@@ -131,13 +139,11 @@ class Store:
         """
         from storage.codec.values import write_value
 
-        with self._explained(), self._staging() as staged:
-            writer = MemberWriter(staged)
-            manifest = write_value(value, writer)
-            if self.durable:
-                writer.sync()
-            with self._publishing():
-                return objects.seal(staged, manifest, self.path, durable=self.durable)
+        with self._explained(), self.medium.stage() as staged:
+            manifest = write_value(value, staged)
+            staged.sync()
+            with self.medium.publishing():
+                return objects.seal(self.medium, staged, manifest)
 
     def record(self, record: ActionRecord) -> ActionRecord:
         """Publish an action record; return the one that counts (the first of its key).
@@ -147,23 +153,22 @@ class Store:
                 record would dangle.
             StoreFull, StoreReadOnly: nothing was recorded.
         """
-        with self._explained(), self._staging() as staged, self._publishing():
+        with self._explained(), self.medium.publishing():
             for output in record.outputs.values():
-                objects.verify(self.path, output.object, "manifest")
-            return actions.create_action(self.path, record, staged, durable=self.durable)
+                objects.verify(self.medium, output.object, "manifest")
+            return actions.create_action(self.medium, record)
 
     def remember_latest(self, record: ActionRecord, scene: str, label: str) -> None:
         """Note that (scene, step, label) now stands on ``record``, for later explanations.
 
         A store that cannot be written to still serves hits: then nothing is noted.
         """
-        if actions.latest_key(self.path, scene, record.step, label) == record.key:
+        if actions.latest_key(self.medium, scene, record.step, label) == record.key:
             return
         try:
-            with self._staging() as staged:
-                actions.point_to_latest(
-                    self.path, staged, scene=scene, step=record.step, label=label, key=record.key
-                )
+            actions.point_to_latest(
+                self.medium, scene=scene, step=record.step, label=label, key=record.key
+            )
         except OSError:
             return
 
@@ -181,12 +186,12 @@ class Store:
         With ``mend`` a damaged object is put into quarantine and its actions are forgotten;
         without, nothing is changed.
         """
-        record = actions.read_action(self.path, key)
+        record = actions.read_action(self.medium, key)
         if record is None:
             return None, "absent"
         for output in record.outputs.values():
             try:
-                objects.verify(self.path, output.object, self.verify_level)
+                objects.verify(self.medium, output.object, self.verify_level)
             except MissingArtifact:
                 if mend:
                     with self._explained():
@@ -224,53 +229,52 @@ class Store:
 
     def manifest(self, object_digest: str) -> Manifest:
         """Return an object's manifest."""
-        return objects.read_manifest(self.path, object_digest)
+        return objects.read_manifest(self.medium, object_digest)
 
     def folder(self, object_digest: str) -> Path:
         """Return the folder of an object, which is a Zarr group; read it only."""
-        return objects.object_folder(self.path, object_digest)
+        return self._folder_medium().folder(object_digest)
 
     def discard(self, object_digest: str) -> None:
         """Put a damaged object into quarantine; every action that gave it is forgotten first."""
         users = [
             record.key
-            for record in actions.all_actions(self.path)
+            for record in actions.all_actions(self.medium)
             if any(output.object == object_digest for output in record.outputs.values())
         ]
         with self._explained():
             self._forget(users)
-            objects.quarantine(self.path, object_digest)
+            self.medium.quarantine(object_digest)
 
     def _forget(self, keys: list[str]) -> None:
         for key in keys:
-            actions.delete_action(self.path, key)
+            actions.delete_action(self.medium, key)
 
     def _reader(self, object_digest: str) -> Any:
         from storage.codec.values import ValueReader
 
-        manifest = objects.verify(self.path, object_digest, self.verify_level)
-        folder = objects.object_folder(self.path, object_digest)
-        return ValueReader(MemberReader(folder, object_digest, manifest))
+        manifest = objects.verify(self.medium, object_digest, self.verify_level)
+        return ValueReader(MemberReader(self.medium, object_digest, manifest))
 
     # -- listing and checking -------------------------------------------------------------
 
     def actions(self) -> Iterator[ActionRecord]:
         """Give every action record, the newest last."""
-        yield from sorted(actions.all_actions(self.path), key=lambda record: record.started)
+        yield from sorted(actions.all_actions(self.medium), key=lambda record: record.started)
 
     def action(self, key: str) -> ActionRecord | None:
         """Return the record of a key, unverified."""
-        return actions.read_action(self.path, key)
+        return actions.read_action(self.medium, key)
 
     def latest(self, scene: str, step: str, label: str = "") -> ActionRecord | None:
         """Return the newest action of a scene's step, for explanations."""
-        key = actions.latest_key(self.path, scene, step, label)
-        return None if key is None else actions.read_action(self.path, key)
+        key = actions.latest_key(self.medium, scene, step, label)
+        return None if key is None else actions.read_action(self.medium, key)
 
     def latest_of_scene(self, scene: str) -> Iterator[tuple[str, str, ActionRecord]]:
         """Give (step, label, newest record) of all that ran for ``scene``."""
-        for step, label, key in actions.latest_of_scene(self.path, scene):
-            record = actions.read_action(self.path, key)
+        for step, label, key in actions.latest_of_scene(self.medium, scene):
+            record = actions.read_action(self.medium, key)
             if record is not None:
                 yield step, label, record
 
@@ -280,9 +284,9 @@ class Store:
 
     def objects(self) -> Iterator[tuple[str, int]]:
         """Give every object's digest and the bytes of its members."""
-        for digest in objects.all_objects(self.path):
+        for digest in self.medium.objects():
             try:
-                yield digest, objects.read_manifest(self.path, digest).size
+                yield digest, objects.read_manifest(self.medium, digest).size
             except (CorruptArtifact, MissingArtifact):
                 yield digest, 0
 
@@ -292,47 +296,28 @@ class Store:
 
     def verify(self, level: Level = "full") -> list[Problem]:
         """Check every object and every action; change nothing."""
-        return check_store(self.path, level)
+        return check_store(self.medium, level)
 
     # -- room to work in ------------------------------------------------------------------
 
     @contextmanager
     def scratch(self) -> Iterator[Path]:
-        """Give a folder on the store's disk for libraries that need files; then remove it."""
+        """Give a folder on this machine for libraries that need files; then remove it."""
         try:
-            with self._staging() as folder:
+            with self.medium.scratch() as folder:
                 yield folder
         except OSError as error:
-            explained = explain_os_error(error, self.path)
+            explained = self.medium.explain(error)
             if isinstance(explained, StoreFull):  # other errors may be the library's own
                 raise explained from error
             raise
-
-    @contextmanager
-    def _staging(self) -> Iterator[Path]:
-        if not self._swept:
-            self._swept = True
-            staging.sweep(self.path)
-        with staging.staging_folder(self.path, durable=False) as folder:
-            yield folder
-
-    @contextmanager
-    def _publishing(self) -> Iterator[None]:
-        """Hold off the collector (which takes this lock alone) while names are made."""
-        flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC
-        descriptor = os.open(self.path / "gc.lock", flags, 0o644)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_SH)
-            yield
-        finally:
-            os.close(descriptor)
 
     @contextmanager
     def _explained(self) -> Iterator[None]:
         try:
             yield
         except OSError as error:
-            explained = explain_os_error(error, self.path)
+            explained = self.medium.explain(error)
             if explained is None:
                 raise
             raise explained from error

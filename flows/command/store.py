@@ -42,7 +42,7 @@ def _list(options: argparse.Namespace, store: Store) -> int:
         for record in records
     ]
     if options.json:
-        print_json({"store": str(store.path), "bytes": store.size(), "actions": rows})
+        print_json({"store": store.address, "bytes": store.size(), "actions": rows})
         return EXIT_OK
     for row in rows:
         name = f"{row['step']}[{row['target']}]" if row["target"] else row["step"]
@@ -50,16 +50,16 @@ def _list(options: argparse.Namespace, store: Store) -> int:
             f"{row['scene']:<20} {name:<30} {row['status']:<9} {row['seconds']:>8.2f} s "
             f"{row['bytes'] / 1e6:>8.2f} MB  {row['key'][:15]}"
         )
-    print(f"{len(rows)} actions, {store.size() / 1e6:.1f} MB in {store.path}")
+    print(f"{len(rows)} actions, {store.size() / 1e6:.1f} MB in {store.address}")
     return EXIT_OK
 
 
 def _verify(options: argparse.Namespace, store: Store) -> int:
     problems = list(store.verify(level="full"))
     if options.json:
-        print_json({"store": str(store.path), "problems": [str(p) for p in problems]})
+        print_json({"store": store.address, "problems": [str(p) for p in problems]})
     else:
         for problem in problems:
             print(problem)
-        print(f"{len(problems)} problems in {store.path}")
+        print(f"{len(problems)} problems in {store.address}")
     return EXIT_FAILED if problems else EXIT_OK

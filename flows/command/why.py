@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
     found = [r for r in store.find(options.artifact) if options.scene in (None, r.scene)]
     if not found:
         raise WrongUse(
-            f"nothing in {store.path} is called {options.artifact}; see `garden store ls`"
+            f"nothing in {store.address} is called {options.artifact}; see `garden store ls`"
         )
     chain = _chain(found[-1], store)
     if options.json:

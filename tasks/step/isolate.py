@@ -73,7 +73,7 @@ def _order(context: RunContext, step: Step, arguments: Arguments, label: str) ->
         "name": step.fn.__qualname__,
         "label": label,
         "code": step.code().digest,
-        "store": str(context.store.path),
+        "store": context.store.address,
         "durability": "full" if context.store.durable else "none",
         "verify": context.store.verify_level,
         "scene": context.scene,

@@ -1,0 +1,72 @@
+"""Keep leases as files of a store's folder, created by link.
+
+A lease that stands is changed under one advisory lock, held for microseconds, that the
+system drops with its owner.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from storage import _os
+from storage.leases import LEASE_S, Accepts, Lease, LeaseTable, lease_name
+
+
+class FolderLeases(LeaseTable):
+    """The leases of a store in a folder."""
+
+    def __init__(self, store: Path, seconds: float = LEASE_S) -> None:
+        super().__init__(seconds)
+        self._store = store
+
+    def _create(self, lease: Lease) -> bool:
+        _os.ensure_folder(self._store / "leases", durable=False)
+        draft = self._draft(lease)
+        try:
+            _os.active.link(draft, self._store / lease_name(lease.key))
+        except FileExistsError:
+            return False
+        finally:
+            _os.active.unlink(draft)
+        return True
+
+    def _exchange(self, key: str, accepts: Accepts, new: Lease | None) -> bool:
+        place = self._store / lease_name(key)
+        with self._locked():
+            current = self._read(key)
+            if not accepts(current):
+                return False
+            if new is not None:
+                _os.active.rename(self._draft(new), place)
+            elif current is not None:
+                _os.active.unlink(place)
+            return True
+
+    def _read(self, key: str) -> Lease | None:
+        try:
+            return Lease.from_bytes((self._store / lease_name(key)).read_bytes())
+        except (FileNotFoundError, ValueError):
+            return None
+
+    def _draft(self, lease: Lease) -> Path:
+        drafts = self._store / "tmp"
+        _os.ensure_folder(drafts, durable=False)
+        draft = drafts / f"{lease.token}-{uuid.uuid4().hex}.lease"
+        _os.active.write(draft, lease.to_bytes())
+        return draft
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        folder = self._store / "leases"
+        _os.ensure_folder(folder, durable=False)
+        descriptor = os.open(folder / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+            yield
+        finally:
+            os.close(descriptor)
