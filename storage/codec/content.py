@@ -1,7 +1,8 @@
 """Hash the logical value: what it holds, not how it is written.
 
 Another compression, chunking or library version gives the same content digest, so that
-steps downstream do not run again for it (invariant EARLY-CUTOFF).
+steps downstream do not run again for it (invariant EARLY-CUTOFF). Fields that do not count
+(``storage.canonical.UNKEYED``: a place, a time that something took) are left out.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from typing import Any
 
 from storage.canonical import dtype_name, is_array, little_endian
 from storage.codec.tables import table_digest
-from storage.codec.tree import Encoded, encode, kind_of
+from storage.codec.tree import Encoded, counted, encode, kind_of
 from storage.digest import digest_bytes, digest_value
 
 
@@ -22,8 +23,9 @@ def content_digest(value: object) -> str:
 
 def encoded_digest(encoded: Encoded, schema: str) -> str:
     """Return the content digest of a value that was taken apart."""
-    leaves = {path: leaf_digest(leaf) for path, leaf in encoded.leaves.items()}
-    return digest_value((schema, encoded.tree, leaves), domain="garden.content/1")
+    tree, paths = counted(encoded.tree)
+    leaves = {path: leaf_digest(leaf) for path, leaf in encoded.leaves.items() if path in paths}
+    return digest_value((schema, tree, leaves), domain="garden.content/1")
 
 
 def leaf_digest(leaf: Any) -> tuple[object, ...]:

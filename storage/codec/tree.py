@@ -1,7 +1,8 @@
 """Take a value apart into a JSON tree and its leaves, and put it together again.
 
 The tree says what every node is (``{"$tuple": [...]}``, ``{"$type": "View", ...}``), so
-that reading needs the classes only to build them; storage itself knows no noun.
+that reading needs the classes only to build them; storage itself knows no noun. Fields
+that do not count (``storage.canonical.UNKEYED``) stand apart from the others.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from storage.canonical import is_array, plain_scalar
+from storage.canonical import UNKEYED, is_array, plain_scalar
 from storage.errors import SchemaMismatch, Unstorable
 
 Json = Any
@@ -39,6 +40,29 @@ def encode(value: object) -> Encoded:
     encoded = Encoded()
     encoded.tree = _encode(value, "", encoded.leaves)
     return encoded
+
+
+def counted(tree: Json) -> tuple[Json, frozenset[str]]:
+    """Return a tree without the fields that do not count, and the leaves that it still has."""
+    leaves: set[str] = set()
+    return _counted(tree, leaves), frozenset(leaves)
+
+
+def _counted(tree: Json, leaves: set[str]) -> Json:
+    if isinstance(tree, list):
+        return [_counted(item, leaves) for item in tree]
+    if not isinstance(tree, dict):
+        return tree
+    if "$leaf" in tree:
+        leaves.add(tree["$leaf"])
+    for part in ("$dict", "fields"):
+        if part in tree:
+            children = {name: _counted(child, leaves) for name, child in tree[part].items()}
+            rest = {name: tree[name] for name in tree.keys() - {part, UNKEYED}}
+            return {**rest, part: children}
+    if "$tuple" in tree:
+        return {"$tuple": [_counted(item, leaves) for item in tree["$tuple"]]}
+    return tree
 
 
 def kind_of(value: object) -> tuple[str, str]:
@@ -70,11 +94,12 @@ def _encode(value: object, where: str, leaves: dict[str, Any]) -> Json:
             "$dict": {_key(k, where): _encode(value[k], _join(where, k), leaves) for k in value}
         }
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields = {
-            f.name: _encode(getattr(value, f.name), _join(where, f.name), leaves)
-            for f in dataclasses.fields(value)
-        }
-        return {"$type": type(value).__name__, "fields": fields}
+        node: dict[str, Json] = {"$type": type(value).__name__, "fields": {}}
+        for f in dataclasses.fields(value):
+            part = UNKEYED if f.metadata.get(UNKEYED) else "fields"
+            stored = _encode(getattr(value, f.name), _join(where, f.name), leaves)
+            node.setdefault(part, {})[f.name] = stored
+        return node
     raise Unstorable(
         f"{where or 'the value'} is a {type(value).__name__}: store dataclasses of numpy"
         " arrays, numbers, str, bytes, None, tuples, lists, dicts and pyarrow tables"
@@ -126,10 +151,10 @@ def decode(tree: Json, expected: object, leaf: Callable[[str], Any]) -> Any:
 
 def field_tree(tree: Json, name: str) -> Json:
     """Return the subtree of one field of a dataclass' tree."""
-    try:
-        return tree["fields"][name]
-    except (KeyError, TypeError):
-        raise SchemaMismatch(f"the stored value has no field {name!r}") from None
+    for part in ("fields", UNKEYED):
+        if isinstance(tree, dict) and name in tree.get(part, {}):
+            return tree[part][name]
+    raise SchemaMismatch(f"the stored value has no field {name!r}")
 
 
 def field_hints(cls: type) -> dict[str, object]:
@@ -150,7 +175,7 @@ def _build(tree: dict[str, Json], expected: object, leaf: Callable[[str], Any]) 
             f"the stored value is a {name}, expected {' or '.join(candidates) or expected}"
         )
     cls = candidates[name]
-    stored: dict[str, Json] = tree["fields"]
+    stored: dict[str, Json] = tree["fields"] | tree.get(UNKEYED, {})
     known = {f.name: f for f in dataclasses.fields(cls)}
     if unknown := sorted(stored.keys() - known.keys()):
         raise SchemaMismatch(f"the stored {name} has the field {unknown[0]!r}, which {cls} lacks")

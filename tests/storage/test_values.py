@@ -6,7 +6,7 @@ import dataclasses
 import json
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from storage import SchemaMismatch, Store, Unstorable
+from storage.canonical import UNKEYED
 from storage.codec.content import content_digest
 from tests.storage.samples import Scale, Scene, View, same, scene
 
@@ -196,3 +197,35 @@ def test_importing_storage_is_quick_and_loads_no_format_library() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert result.stdout.strip() == "[]"
+
+
+@dataclass(frozen=True)
+class Timed:
+    value: np.ndarray
+    seconds: float = field(default=0.0, metadata={UNKEYED: True})
+    log: str = field(default="", metadata={UNKEYED: True})
+
+
+@dataclass(frozen=True)
+class Runs:
+    runs: tuple[Timed, ...]
+    by_name: dict[str, Timed]
+
+
+def runs(seconds: float, value: float = 1.0) -> Runs:
+    timed = Timed(np.array([value]), seconds, f"{seconds}" * 5000)
+    return Runs((timed,), {"$leaf": timed, "$type": timed})
+
+
+def test_same_as_cold_what_does_not_count_comes_back_but_is_not_content(store: Store) -> None:
+    """A step that notes how long something took gives equal results twice."""
+    first, second = store.publish(runs(1.0)), store.publish(runs(2.0))
+    assert first.content == second.content
+    assert first.object != second.object
+    again = store.read(second.object, Runs)
+    assert again.runs[0].seconds == again.by_name["$type"].seconds == 2.0
+    assert again.runs[0].log == "2.0" * 5000
+    assert store.read_fields(store.publish(again.runs[0]).object, Timed, ("seconds",)) == {
+        "seconds": 2.0
+    }
+    assert store.publish(runs(1.0, value=3.0)).content != first.content
