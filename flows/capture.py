@@ -50,6 +50,14 @@ def find_capture(path: Path, cameras: Path | None) -> FoundCapture:
     return _photos(path.resolve(), photo_paths(path), cameras)
 
 
+def capture_name(path: Path) -> str:
+    """Return the name that a scene of this capture has, whether or not it can be read."""
+    if path.is_file() and path.suffix.lower() in VIDEO_SUFFIXES:
+        return path.stem
+    place = path.resolve()
+    return place.parent.name if path.is_file() else place.name
+
+
 def _photos(folder: Path, photos: list[Path], cameras: Path | None) -> FoundCapture:
     if len(photos) < 2:
         raise UnreadableInput(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import tomllib
 import typing
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -50,20 +51,38 @@ def read_preset(name_or_file: str, settings: list[str]) -> Preset:
 
     Raises BadInput for an unknown preset, step or option, or a value of the wrong type.
     """
-    if name_or_file in PRESETS:
-        preset = PRESETS[name_or_file]
-    elif name_or_file.endswith(".toml"):
-        preset = _from_toml(Path(name_or_file))
-    else:
-        raise BadInput(
-            f"no preset called {name_or_file}: use one of {', '.join(PRESETS)} or a .toml file"
-        )
+    preset = named_preset(name_or_file)
     for setting in settings:
         path, separator, value = setting.partition("=")
-        step, dot, option = path.partition(".")
-        if not (separator and dot):
+        if not (separator and "." in path):
             raise BadInput(f"--set {setting}: write it as STEP.OPTION=VALUE")
-        preset = _changed(preset, step, {option: _parsed(value)})
+        preset = with_settings(preset, {path: _parsed(value)})
+    return preset
+
+
+def named_preset(name_or_file: str, folder: Path = Path()) -> Preset:
+    """Return a named preset or that of a TOML file, whose path is relative to ``folder``."""
+    if name_or_file in PRESETS:
+        return PRESETS[name_or_file]
+    if name_or_file.endswith(".toml"):
+        return _from_toml(folder / name_or_file)
+    raise BadInput(
+        f"no preset called {name_or_file}: use one of {', '.join(PRESETS)} or a .toml file"
+    )
+
+
+def with_settings(preset: Preset, settings: Mapping[str, Any]) -> Preset:
+    """Return the preset with some options changed.
+
+    Settings are ``{"reconstruct": {"long_side": 640}}`` or ``{"reconstruct.long_side": 640}``.
+    Raises BadInput for an unknown step or option, or a value of the wrong type.
+    """
+    for name, value in settings.items():
+        step, dot, option = name.partition(".")
+        options = {option: value} if dot else value
+        if not isinstance(options, Mapping):
+            raise BadInput(f"{name} is a step: give its options as {name}.OPTION = VALUE")
+        preset = _changed(preset, step, options)
     return preset
 
 
@@ -74,13 +93,13 @@ def _from_toml(path: Path) -> Preset:
         raise BadInput(f"no such preset file: {path}") from None
     except tomllib.TOMLDecodeError as error:
         raise BadInput(f"{path} is not TOML: {error}") from None
-    preset = PRESETS[document.pop("preset", "embedded")]
-    for step, options in document.items():
-        preset = _changed(preset, step, options)
-    return preset
+    base = document.pop("preset", "embedded")
+    if base not in PRESETS:
+        raise BadInput(f"{path} builds on the preset {base}: use one of {', '.join(PRESETS)}")
+    return with_settings(PRESETS[base], document)
 
 
-def _changed(preset: Preset, step: str, options: dict[str, Any]) -> Preset:
+def _changed(preset: Preset, step: str, options: Mapping[str, Any]) -> Preset:
     steps = [f.name for f in dataclasses.fields(preset)]
     if step not in steps:
         raise BadInput(f"no step called {step} in a preset: there are {', '.join(steps)}")

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 from pathlib import Path
 
-from flows.capture import FoundCapture, find_capture
 from flows.command import say
 from flows.preset import read_preset
+from flows.scene_request import SceneOptions, read_scene
 from flows.scene_run import SceneRequest
 from flows.wrong_use import WrongUse
 from garden_models.scene import Target
-from garden_models.targets.boxes import check_name, parse_boxes, parse_targets, validate
+from garden_models.targets.boxes import parse_boxes
 from storage import Store
 
 SCENES = "scenes"
@@ -58,21 +57,20 @@ def add_scene_options(parser: argparse.ArgumentParser) -> None:
 
 def scene_request(options: argparse.Namespace) -> SceneRequest:
     """Check the options and return the scene they ask for, before any work starts."""
-    capture = find_capture(Path(options.capture), options.cameras and Path(options.cameras))
-    name = check_name(options.name or capture.name, "scene")
-    targets = _targets(options, capture)
-    if capture.sizes:
-        validate(targets, capture.sizes)
-    preset = read_preset(options.preset, options.settings)
-    return SceneRequest(
-        name=name,
-        source=capture.source,
-        targets=targets,
-        preset=preset,
-        package=Path(options.out) / name,
-        remarks=_remarks(capture, targets),
-        force=frozenset(options.force),
+    request = read_scene(
+        SceneOptions(
+            capture=Path(options.capture),
+            out=Path(options.out),
+            preset=read_preset(options.preset, options.settings),
+            name=options.name,
+            cameras=Path(options.cameras) if options.cameras else None,
+            targets=_targets(options),
+            force=frozenset(options.force),
+        )
     )
+    for remark in request.remarks:
+        say(f"note: {remark}")
+    return request
 
 
 def open_store(options: argparse.Namespace, create: bool = True) -> Store:
@@ -88,34 +86,9 @@ def store_path(given: str | None) -> Path:
     return (Path(cache) if cache else Path.home() / ".cache") / "garden" / "store"
 
 
-def _targets(options: argparse.Namespace, capture: FoundCapture) -> tuple[Target, ...]:
+def _targets(options: argparse.Namespace) -> Path | tuple[Target, ...] | None:
     if options.targets and options.box:
         raise WrongUse("give the targets either with --targets or with --box, not both")
     if options.box:
         return parse_boxes(options.box)
-    path = Path(options.targets) if options.targets else capture.targets_file
-    if path is None:
-        return ()
-    try:
-        return parse_targets(json.loads(path.read_text("utf-8")))
-    except FileNotFoundError:
-        raise WrongUse(f"no such targets file: {path}") from None
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise WrongUse(f"{path} is not JSON ({error}): see README for its form") from None
-
-
-def _remarks(capture: FoundCapture, targets: tuple[Target, ...]) -> tuple[str, ...]:
-    remarks = []
-    if not targets:
-        remarks.append(
-            "no targets were given, so nothing was factored out (give some with --box NAME PHOTO "
-            "X0 Y0 X1 Y1 or a targets.json)"
-        )
-    if capture.unused_cameras:
-        remarks.append(
-            f"{capture.unused_cameras.name} lies beside the photos but was not used; give it with "
-            "--cameras to use it"
-        )
-    for remark in remarks:
-        say(f"note: {remark}")
-    return tuple(remarks)
+    return Path(options.targets) if options.targets else None

@@ -1,0 +1,81 @@
+"""Make a scene's request of what a user gave: its capture, targets, cameras and options."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from flows.capture import FoundCapture, find_capture
+from flows.preset import PRESETS, Preset
+from flows.scene_run import SceneRequest
+from flows.wrong_use import WrongUse
+from garden_models.scene import Target
+from garden_models.targets.boxes import check_name, parse_targets, validate
+
+
+@dataclass(frozen=True)
+class SceneOptions:
+    """What a user says of one scene, on the command line or in a collection's file.
+
+    ``name`` is the capture's if not given; ``targets`` are a file's or those given, None for
+    the ``targets.json`` beside the photos.
+    """
+
+    capture: Path
+    out: Path
+    preset: Preset = PRESETS["embedded"]
+    name: str | None = None
+    cameras: Path | None = None
+    targets: Path | tuple[Target, ...] | None = None
+    force: frozenset[str] = frozenset()
+
+
+def read_scene(options: SceneOptions) -> SceneRequest:
+    """Look at the capture, check everything, and return the scene that is asked for.
+
+    Raises WrongUse, BadInput or UnreadableInput, which name the file and the remedy.
+    """
+    capture = find_capture(options.capture, options.cameras)
+    name = check_name(options.name or capture.name, "scene")
+    targets = _targets(options.targets, capture)
+    if capture.sizes:
+        validate(targets, capture.sizes)
+    return SceneRequest(
+        name=name,
+        source=capture.source,
+        targets=targets,
+        preset=options.preset,
+        package=options.out / name,
+        remarks=_remarks(capture, targets),
+        force=options.force,
+    )
+
+
+def _targets(given: Path | tuple[Target, ...] | None, capture: FoundCapture) -> tuple[Target, ...]:
+    if isinstance(given, tuple):
+        return given
+    path = given or capture.targets_file
+    if path is None:
+        return ()
+    try:
+        return parse_targets(json.loads(path.read_text("utf-8")))
+    except FileNotFoundError:
+        raise WrongUse(f"no such targets file: {path}") from None
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise WrongUse(f"{path} is not JSON ({error}): see README for its form") from None
+
+
+def _remarks(capture: FoundCapture, targets: tuple[Target, ...]) -> tuple[str, ...]:
+    remarks = []
+    if not targets:
+        remarks.append(
+            "no targets were given, so nothing was factored out (give some with --box NAME PHOTO "
+            "X0 Y0 X1 Y1 or a targets.json)"
+        )
+    if capture.unused_cameras:
+        remarks.append(
+            f"{capture.unused_cameras.name} lies beside the photos but was not used; give it with "
+            "--cameras to use it"
+        )
+    return tuple(remarks)
