@@ -14,7 +14,7 @@ from garden_models.scene import Target
 from storage import Store
 from storage.formats.package import check_writable, package_source
 from tasks.ingest import CaptureSource
-from tasks.step import PlanEntry, RunContext, StepEvent, StepFailed, run_context
+from tasks.step import Budget, PlanEntry, RunContext, StepEvent, StepFailed, run_context
 
 
 @dataclass(frozen=True)
@@ -64,17 +64,21 @@ def run_scene(
     store: Store,
     events: Callable[[StepEvent], None],
     engine: Literal["prefect", "local"] = "prefect",
+    budget: Budget | None = None,
 ) -> SceneResult:
     """Execute the scene's flow with Prefect (or ``local``, in this process without it).
+
+    Steps start when the ``budget`` (of the whole machine if not given) has room for them.
 
     A scene that fails comes back with ``refs.failure`` set and all that was computed.
     """
     check_writable(request.package)
+    budget = budget or Budget.of_machine()
     if engine == "local":
-        return _run(request, _context(request, store, "local", events))
+        return _run(request, _context(request, store, "local", events, budget))
     from flows.prefect_flow import PrefectProgress, scene_flow
 
-    context = _context(request, store, "prefect", PrefectProgress(events))
+    context = _context(request, store, "prefect", PrefectProgress(events), budget)
     result: SceneResult = scene_flow(request.name)(_run)(request, context)
     return result
 
@@ -84,9 +88,16 @@ def _context(
     store: Store,
     engine: Literal["prefect", "local"],
     events: Callable[[StepEvent], None],
+    budget: Budget,
 ) -> RunContext:
     return RunContext(
-        store=store, scene=request.name, engine=engine, events=events, force=request.force
+        store=store,
+        scene=request.name,
+        engine=engine,
+        events=events,
+        force=request.force,
+        workers=max(2, len(budget.cores)),
+        budget=budget,
     )
 
 

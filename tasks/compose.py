@@ -27,6 +27,7 @@ from tasks.step import step
     isolated=True,
     time_limit_s=1800,
     memory_limit_gb=4,
+    memory_gb=1.0,
 )
 def compose(
     reconstruction: Reconstruction,

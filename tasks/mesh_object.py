@@ -22,6 +22,8 @@ from tasks.step import step
         "embreex",
         "fast-simplification",
     ),
+    cores="all",
+    memory_gb=1.5,
 )
 def mesh_object(
     reconstruction: Reconstruction,

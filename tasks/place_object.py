@@ -11,7 +11,11 @@ from garden_models.scene import GravityView, ObjectMasks, ObjectMesh, Placement,
 from tasks.step import step
 
 
-@step(version=1, packages=("numpy", "scipy", "torch", "opencv-python-headless", "embreex"))
+@step(
+    version=1,
+    packages=("numpy", "scipy", "torch", "opencv-python-headless", "embreex"),
+    memory_gb=1.5,
+)
 def place_object(
     reconstruction: Reconstruction,
     gravity_view: GravityView,

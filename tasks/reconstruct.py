@@ -18,6 +18,8 @@ from tasks.step import step
     isolated=True,
     time_limit_s=3600,
     memory_limit_gb=6,
+    cores="all",
+    memory_gb=2.0,
 )
 def reconstruct(
     capture: Capture, cameras: SparseModel, config: DenseStereo, progress: Progress = silent

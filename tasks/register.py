@@ -18,6 +18,8 @@ from tasks.step import step, step_scratch
     isolated=True,
     time_limit_s=3600,
     memory_limit_gb=6,
+    cores="all",
+    memory_gb=2.0,
 )
 def register(capture: Capture, config: Registration, progress: Progress = silent) -> SparseModel:
     """Return the cameras and sparse points, or a verdict that names what was missing."""

@@ -18,7 +18,7 @@ from garden_models.scene import (
 from tasks.step import step
 
 
-@step(version=1, packages=("numpy",))
+@step(version=1, packages=("numpy",), memory_gb=1.5)
 def render(
     reconstruction: Reconstruction,
     gravity_view: GravityView,

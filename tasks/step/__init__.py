@@ -12,6 +12,7 @@ shell looks the action up, loads, computes, publishes and records. ``align_gravi
 the pure function.
 """
 
+from tasks.step.budget import Budget, Need
 from tasks.step.decorator import Step, StepSpec, step
 from tasks.step.ref import (
     Cancelled,
@@ -28,7 +29,9 @@ from tasks.step.run import RunContext, current_run, load, run_context, step_scra
 from tasks.step.submit import fan_out
 
 __all__ = [
+    "Budget",
     "Cancelled",
+    "Need",
     "PendingValue",
     "PlanEntry",
     "Ref",

@@ -8,9 +8,10 @@ from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from storage.digest import digest_file
+from tasks.step.budget import ONE_CORE, Need
 from tasks.step.code import Code, code_of
 from tasks.step.execute import Call, execute, plan
 from tasks.step.inputs import Arguments, bind, futures_in, label_of, resolve, split
@@ -42,6 +43,7 @@ class StepSpec:
     isolated: bool = False
     time_limit_s: float | None = None
     memory_limit_gb: float | None = None
+    need: Need = ONE_CORE
 
 
 class Step:
@@ -155,6 +157,9 @@ def step(
     isolated: bool = False,
     time_limit_s: float | None = None,
     memory_limit_gb: float | None = None,
+    cores: int | Literal["all"] = 1,
+    memory_gb: float = 1.0,
+    gpus: int = 0,
 ) -> Callable[[Callable[..., Any]], Step]:
     """Make a step of a function.
 
@@ -172,6 +177,11 @@ def step(
         isolated: compute in a child process, which can be stopped.
         time_limit_s: seconds after which an isolated step is killed.
         memory_limit_gb: resident memory beyond which an isolated step is killed.
+        cores: how many cores it keeps busy; ``all`` for a step that takes what there is.
+        memory_gb: resident memory that it needs at its peak, by measurement.
+        gpus: how many GPUs it needs for itself.
+
+    A run with a budget starts the step when its cores, memory and GPUs are free.
     """
     if not isolated and (time_limit_s is not None or memory_limit_gb is not None):
         raise ValueError("only a step with isolated=True can be held to a time or memory limit")
@@ -190,6 +200,7 @@ def step(
             isolated=isolated,
             time_limit_s=time_limit_s,
             memory_limit_gb=memory_limit_gb,
+            need=Need(cores, memory_gb, gpus),
         )
         return Step(fn, spec)
 

@@ -8,12 +8,13 @@ import random
 import socket
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from garden_models.scene import BadGeometry, BadInput
 from storage import ActionRecord, Output, StoreError
+from tasks.step.budget import Held, is_holding
 from tasks.step.compute import Done, compute
 from tasks.step.inputs import Arguments, each
 from tasks.step.key import KeyParts, explain
@@ -134,7 +135,8 @@ def execute(call: Call, lost: str = "") -> Ref:
             waited = time.monotonic() - started
             if found is not None:
                 return _hit(call, found, Seconds(wait=waited))
-            return _make(call, parts, why, waited)
+            with _room(call) as held:
+                return _make(call, parts, why, waited + held.waited, held.gpus)
     except Exception as error:
         failure = _failure(call, error)
         seconds = Seconds(compute=time.monotonic() - started)
@@ -150,11 +152,19 @@ def _hit(call: Call, record: ActionRecord, seconds: Seconds) -> Ref:
     return ref
 
 
-def _make(call: Call, parts: KeyParts, why: Why, waited: float) -> Ref:
+def _room(call: Call) -> AbstractContextManager[Held]:
+    """Hold the step's part of the run's budget while it is computed."""
+    context = call.context
+    if context.budget is None:
+        return nullcontext(Held())
+    return context.budget.hold(call.step.spec.need, context.cancelled)
+
+
+def _make(call: Call, parts: KeyParts, why: Why, waited: float, gpus: tuple[str, ...]) -> Ref:
     context, step = call.context, call.step
     context.emit(_event(call, "started", why=why))
     started = time.time()
-    done, attempt = _with_retries(call)
+    done, attempt = _with_retries(call, gpus)
     published = done.published
     recording = time.monotonic()
     record = ActionRecord(
@@ -189,12 +199,12 @@ def _make(call: Call, parts: KeyParts, why: Why, waited: float) -> Ref:
     return ref
 
 
-def _with_retries(call: Call) -> tuple[Done, int]:
+def _with_retries(call: Call, gpus: tuple[str, ...]) -> tuple[Done, int]:
     """Compute; try again after faults that may pass, and once after a damaged input."""
     attempt = 1
     while True:
         try:
-            return _compute(call), attempt
+            return _compute(call, gpus), attempt
         except (OSError, MemoryError) as error:
             if not is_transient(error) or attempt > call.step.spec.retries:
                 raise
@@ -204,14 +214,14 @@ def _with_retries(call: Call) -> tuple[Done, int]:
         attempt += 1
 
 
-def _compute(call: Call) -> Done:
+def _compute(call: Call, gpus: tuple[str, ...]) -> Done:
     def report(share: float, doing: str) -> None:
         call.context.emit(_event(call, "progress", share=share, doing=doing))
 
     if call.step.spec.isolated and call.context.isolate:
         from tasks.step.isolate import compute_isolated
 
-        return compute_isolated(call.context, call.step, call.arguments, call.label, report)
+        return compute_isolated(call.context, call.step, call.arguments, call.label, report, gpus)
     return compute(call.context, call.step, call.arguments, report)
 
 
@@ -246,10 +256,11 @@ def _single_flight(call: Call, key: str, forced: bool) -> Iterator[ActionRecord 
     """Become the one that computes ``key`` (gives None), or give what another one found.
 
     Whoever holds the lease dies with it; whoever waits takes over. After a bounded wait
-    the step is computed anyway: the first result counts.
+    the step is computed anyway: the first result counts. That is at once for what holds a
+    part of the budget, for which the other one may be waiting.
     """
     store = call.context.store
-    deadline = time.monotonic() + LONGEST_WAIT_S
+    deadline = time.monotonic() + (0.0 if is_holding() else LONGEST_WAIT_S)
     pause = _POLL_S[0]
     while (lease := store.acquire(key)) is None and time.monotonic() < deadline:
         call.context.cancelled.wait(pause)

@@ -44,8 +44,11 @@ def compute_isolated(
     arguments: Arguments,
     label: str,
     report: Callable[[float, str], None],
+    gpus: tuple[str, ...] = (),
 ) -> Done:
     """Compute a step in a child process and return what it published.
+
+    ``gpus`` are those that the step holds: the child sees no others, if there are any.
 
     Raises:
         TimeLimit, MemoryLimit: it was killed for that.
@@ -54,7 +57,7 @@ def compute_isolated(
         BadInput, BadGeometry, MemoryError, OSError, StoreError: as raised in the child.
     """
     order = _order(context, step, arguments, label)
-    with context.store.scratch() as folder, _child(folder, order) as child:
+    with context.store.scratch() as folder, _child(folder, order, gpus) as child:
         answer = _listen(context, step, child, report)
     if "error" in answer:
         raise _rebuild(answer["error"])
@@ -110,13 +113,15 @@ class _Child:
 
 
 @contextmanager
-def _child(folder: Path, order: dict[str, Any]) -> Iterator[_Child]:
+def _child(folder: Path, order: dict[str, Any], gpus: tuple[str, ...]) -> Iterator[_Child]:
     reading, writing = os.pipe()
     output = folder / "output.txt"
     (folder / "order.json").write_text(json.dumps(order))
     command = [sys.executable, "-m", "tasks.step.child"]
     command += [str(writing), str(os.getpid()), str(folder / "order.json")]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    if gpus:
+        environment["CUDA_VISIBLE_DEVICES"] = ",".join(gpus)
     try:
         with output.open("wb") as printed:
             process = subprocess.Popen(

@@ -16,6 +16,7 @@ from types import FrameType
 from typing import Any, Literal, TypeVar
 
 from storage import Store
+from tasks.step.budget import Budget
 from tasks.step.ref import PendingValue, PlanEntry, Ref, StepEvent
 
 Engine = Literal["prefect", "local", "plan"]
@@ -32,8 +33,8 @@ class RunContext:
 
     ``force`` names steps (``segment`` or ``segment[bulldozer]``, ``*`` for all) that run
     even on a hit. ``workers`` bounds the steps that the local engine runs at once.
-    ``isolate=False`` runs isolated steps in this process (for tests). ``outcomes`` and
-    ``plan`` are filled as steps finish.
+    ``isolate=False`` runs isolated steps in this process (for tests). Without ``budget``
+    steps wait for nobody. ``outcomes`` and ``plan`` are filled as steps finish.
     """
 
     store: Store
@@ -43,6 +44,7 @@ class RunContext:
     force: frozenset[str] = frozenset()
     workers: int = 2
     isolate: bool = True
+    budget: Budget | None = None
     run_id: str = field(default_factory=lambda: uuid.uuid4().hex[:12])
     outcomes: list[StepEvent] = field(default_factory=list)
     plan: list[PlanEntry] = field(default_factory=list)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -89,6 +90,28 @@ def dawdle(marker: str) -> Numbers:
     Path(marker).write_text(str(os.getpid()))
     time.sleep(30)
     return Numbers(np.zeros(1))
+
+
+spins: list[int] = []
+_spinning = [0]
+_spin_guard = threading.Lock()
+
+
+@step(version=1, memory_gb=0.5)
+def spin(number: int) -> Numbers:
+    """Take a moment, and note how many do so at once."""
+    with _spin_guard:
+        _spinning[0] += 1
+        spins.append(_spinning[0])
+    time.sleep(0.2)
+    with _spin_guard:
+        _spinning[0] -= 1
+    return Numbers(np.full(1, float(number)))
+
+
+def fan(count: int, first: int = 0) -> list[Ref]:
+    futures = [spin.submit(first + number) for number in range(count)]
+    return [future.result() for future in futures]
 
 
 def target(name: str) -> Target:
