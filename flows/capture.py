@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 
 from flows.wrong_use import WrongUse
 from storage import SourceFile
+from storage.formats.archive_name import archive_stem, is_archive
 from storage.formats.cameras import camera_files, colmap_folder
 from storage.formats.errors import UnreadableInput
+from storage.formats.member_name import is_inside
 from storage.formats.photos import photo_paths, photo_size
 from tasks.ingest import CaptureSource
 
@@ -32,6 +35,8 @@ class FoundCapture:
 
 def find_capture(path: Path, cameras: Path | None) -> FoundCapture:
     """Look at a user's path; raise WrongUse or UnreadableInput for what is no capture."""
+    if path.is_file() and is_archive(path):
+        return _in_archive(path, cameras)
     if path.is_file() and path.suffix.lower() in VIDEO_SUFFIXES:
         if cameras is not None:
             raise WrongUse("a video's frames have no known cameras: leave --cameras out")
@@ -41,8 +46,8 @@ def find_capture(path: Path, cameras: Path | None) -> FoundCapture:
         return _photos(path.parent.resolve(), _photos_of_transforms(path), cameras or path)
     if path.is_file():
         raise WrongUse(
-            f"{path} is no capture: give a folder of photos, a video, a transforms.json or a "
-            "COLMAP model"
+            f"{path} is no capture: give a folder of photos, a video, a transforms.json, a "
+            "COLMAP model, or a .zip or .tar.gz of one of these"
         )
     model = None if (path / "images").is_dir() else colmap_folder(path)
     if model is not None:
@@ -52,10 +57,19 @@ def find_capture(path: Path, cameras: Path | None) -> FoundCapture:
 
 def capture_name(path: Path) -> str:
     """Return the name that a scene of this capture has, whether or not it can be read."""
+    if path.is_file() and is_archive(path):
+        return archive_stem(path)
     if path.is_file() and path.suffix.lower() in VIDEO_SUFFIXES:
         return path.stem
     place = path.resolve()
     return place.parent.name if path.is_file() else place.name
+
+
+def _in_archive(path: Path, cameras: Path | None) -> FoundCapture:
+    from flows.unpacked import unpacked
+
+    found = find_capture(unpacked(path), cameras)
+    return dataclasses.replace(found, name=archive_stem(path))
 
 
 def _photos(folder: Path, photos: list[Path], cameras: Path | None) -> FoundCapture:
@@ -64,6 +78,12 @@ def _photos(folder: Path, photos: list[Path], cameras: Path | None) -> FoundCapt
             f"only one photo in {photos[0].parent}: depth needs at least 3 photos from "
             "different places; take 10 to 60 around the objects"
         )
+    for photo in photos:
+        if not is_inside(photo.name):
+            raise UnreadableInput(
+                f"the photo {photo.name!r} has a backslash or a control character in its name, "
+                "or too long a name: rename it"
+            )
     known = tuple(SourceFile.of(file) for file in camera_files(cameras)) if cameras else ()
     source = CaptureSource("photos", tuple(SourceFile.of(photo) for photo in photos), known)
     return FoundCapture(

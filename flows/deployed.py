@@ -12,9 +12,11 @@ from flows.command.scene_options import add_scene_options, scene_request, store_
 from flows.package.write import refresh_report, write_scene_package
 from flows.scene_run import is_finished, plan_scene, run_scene
 from storage import Store
+from storage.redact import without_secrets
 
 
 @flow(name="factorize-capture", flow_run_name="{capture}", persist_result=False)
+@without_secrets()
 def factorize_capture(
     capture: str, out: str = "scenes", store: str | None = None, arguments: tuple[str, ...] = ()
 ) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +11,8 @@ from flows.scene_run import SceneRequest
 from flows.wrong_use import WrongUse
 from garden_models.scene import Target
 from garden_models.targets.boxes import check_name, parse_targets, validate
+from storage.formats.errors import UnreadableInput
+from storage.formats.limits import read_json
 
 
 @dataclass(frozen=True)
@@ -59,10 +60,12 @@ def _targets(given: Path | tuple[Target, ...] | None, capture: FoundCapture) -> 
     if path is None:
         return ()
     try:
-        return parse_targets(json.loads(path.read_text("utf-8")))
+        return parse_targets(read_json(path))
     except FileNotFoundError:
         raise WrongUse(f"no such targets file: {path}") from None
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+    except UnreadableInput:
+        raise
+    except ValueError as error:
         raise WrongUse(f"{path} is not JSON ({error}): see README for its form") from None
 
 

@@ -89,8 +89,10 @@ def print_json(document: object) -> None:
 
 
 def say(text: str) -> None:
-    """Tell the user something, on standard error."""
-    print(text, file=sys.stderr, flush=True)
+    """Tell the user something, on standard error; a log may keep it, so no secrets."""
+    from storage.redact import redact
+
+    print(redact(text), file=sys.stderr, flush=True)
 
 
 def _expected_errors() -> tuple[type[Exception], ...]:
@@ -103,9 +105,12 @@ def _expected_errors() -> tuple[type[Exception], ...]:
 
 
 def _fail(options: argparse.Namespace, message: str, code: int) -> int:
-    say(f"garden: {message}")
+    from storage.redact import redact
+
+    said = redact(message)
+    say(f"garden: {said}")
     if options.json:
-        print_json({"status": "failed", "reasons": [message]})
+        print_json({"status": "failed", "reasons": [said]})
     return code
 
 

@@ -6,6 +6,7 @@ import argparse
 import os
 from pathlib import Path
 
+from flows.cache_folder import cache_folder
 from flows.command import say
 from flows.preset import read_preset
 from flows.scene_request import SceneOptions, read_scene
@@ -23,7 +24,8 @@ def add_scene_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "capture",
         metavar="CAPTURE",
-        help="folder of photos (or with images/ in it), video, transforms.json, COLMAP model",
+        help="folder of photos (or with images/ in it), video, transforms.json, COLMAP model, or "
+        "a .zip or .tar.gz of one of these",
     )
     parser.add_argument("--name", help="the scene's name (default: the capture's)")
     parser.add_argument(
@@ -82,8 +84,7 @@ def store_path(given: str | None) -> Path:
     """Return the store's folder."""
     if given or os.environ.get("GARDEN_STORE"):
         return Path(given or os.environ["GARDEN_STORE"])
-    cache = os.environ.get("XDG_CACHE_HOME")
-    return (Path(cache) if cache else Path.home() / ".cache") / "garden" / "store"
+    return cache_folder() / "store"
 
 
 def _targets(options: argparse.Namespace) -> Path | tuple[Target, ...] | None:

@@ -22,6 +22,7 @@ from storage.formats.glb import GlbNode, scene_glb
 from storage.formats.nerfstudio import transforms_json
 from storage.formats.ply import gaussians_ply, points_ply
 from storage.formats.png import depth_png, mask_png
+from storage.redact import redact
 
 GLB_POINTS = 200_000
 """Background points in scene.glb; all of them are in background/points.ply."""
@@ -32,7 +33,7 @@ def package_files(values: SceneValues) -> tuple[dict[str, bytes], Json]:
     document = report_document(values)
     files = {
         "report.json": dump_json(document),
-        "report.html": report_page(values, document).encode(),
+        "report.html": redact(report_page(values, document)).encode(),
         "timings.parquet": timings_parquet(document),
         "targets.json": dump_json(_targets(values)),
         "LICENSES.json": dump_json(licences_document()),

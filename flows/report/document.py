@@ -16,6 +16,7 @@ from garden_models.scene import (
     SparseModel,
     Verdict,
 )
+from storage.redact import redacted
 from tasks.step import Ref, StepEvent
 
 SCHEMA = "garden.report/1"
@@ -66,32 +67,38 @@ def object_verdict(values: ObjectValues, motion: BodyMotion | None) -> Verdict:
 def report_document(values: SceneValues) -> Json:
     """Return the report as a JSON value."""
     verdict = scene_verdict(values.result)
-    return {
-        "schema": SCHEMA,
-        "scene": values.result.request.name,
-        "status": verdict.status,
-        "reasons": list(verdict.reasons),
-        "remarks": scene_remarks(values.result),
-        "photos": _photos(values),
-        "scale": _scale(values),
-        "cameras": _cameras(values.cameras),
-        "gravity": _gravity(values.gravity_view),
-        "supports": [support_document(s) for s in values.scene.supports] if values.scene else [],
-        "objects": _objects(values),
-        "background": _background(values),
-        **run_section(values.result),
-    }
+    return redacted(
+        {
+            "schema": SCHEMA,
+            "scene": values.result.request.name,
+            "status": verdict.status,
+            "reasons": list(verdict.reasons),
+            "remarks": scene_remarks(values.result),
+            "photos": _photos(values),
+            "scale": _scale(values),
+            "cameras": _cameras(values.cameras),
+            "gravity": _gravity(values.gravity_view),
+            "supports": [support_document(s) for s in values.scene.supports]
+            if values.scene
+            else [],
+            "objects": _objects(values),
+            "background": _background(values),
+            **run_section(values.result),
+        }
+    )
 
 
 def run_section(result: SceneResult) -> Json:
     """Return the part of the report that tells of this run: the steps and the time."""
     steps = [_step(event) for event in result.outcomes]
-    return {
-        "steps": steps,
-        "executed": result.executed,
-        "seconds": round(result.seconds, 3),
-        "peak_mb": max((s["peak_mb"] for s in steps), default=0.0),
-    }
+    return redacted(
+        {
+            "steps": steps,
+            "executed": result.executed,
+            "seconds": round(result.seconds, 3),
+            "peak_mb": max((s["peak_mb"] for s in steps), default=0.0),
+        }
+    )
 
 
 def _ref_verdict(ref: Ref) -> Verdict:

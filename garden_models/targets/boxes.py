@@ -11,6 +11,9 @@ import numpy as np
 from garden_models.scene import BadInput, Target
 
 FORM = '{"targets": [{"name": "mug", "image": "a.jpg", "box": [x0, y0, x1, y1]}]}'
+_LONGEST_NAME_BYTES = 200
+"""File systems take 255, and a package is staged under a longer name than its own."""
+
 _SAFE_NAME = re.compile(r"[^\W.\-][\w.\- ]{0,99}")
 
 
@@ -19,10 +22,11 @@ def check_name(name: str, what: str) -> str:
 
     ``what`` says what is called so (``scene``, ``target``).
     """
-    if not _SAFE_NAME.fullmatch(name) or name.endswith((".", " ")):
+    fits = len(name.encode(errors="replace")) <= _LONGEST_NAME_BYTES
+    if not (fits and _SAFE_NAME.fullmatch(name)) or name.endswith((".", " ")):
         raise BadInput(
             f"{name!r} cannot be the name of a {what}: use letters, digits, spaces, '_', '-' and "
-            "'.', starting with a letter or digit"
+            "'.', starting with a letter or digit, 100 at most"
         )
     return name
 

@@ -40,9 +40,9 @@ def colmap_folder(path: Path) -> Path | None:
 def read_cameras(files: tuple[Path, ...]) -> tuple[PosedCamera, ...]:
     """Read the cameras from the files that ``camera_files`` found."""
     if files[0].suffix.lower() == ".json":
-        from storage.formats.nerfstudio import read_transforms
+        from storage.formats.nerfstudio import read_transforms_cameras
 
-        return read_transforms(files[0])[0]
+        return read_transforms_cameras(files[0])
     from storage.formats.colmap import read_model
 
     return read_model(files[0].parent)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from storage.formats.errors import UnreadableInput
+from storage.formats.limits import read_json
 from storage.formats.posed_camera import PosedCamera
 
 OPENCV_FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -25,30 +26,49 @@ def is_transforms(path: Path) -> bool:
 def read_transforms(path: Path) -> tuple[tuple[PosedCamera, ...], tuple[Path, ...]]:
     """Return the cameras of a ``transforms.json`` and the photo files it names.
 
+    Photos must be named inside the file's folder: what was downloaded must not pick files
+    from elsewhere into a report that is passed on; a link that the user made there may lead
+    anywhere. Raises UnreadableInput naming the file and what is wrong in it.
+    """
+    cameras, names = _read(path)
+    return cameras, tuple(_inside(path, name) for name in names)
+
+
+def read_transforms_cameras(path: Path) -> tuple[PosedCamera, ...]:
+    """Return the cameras of a ``transforms.json`` whose photos are given otherwise."""
+    return _read(path)[0]
+
+
+def _read(path: Path) -> tuple[tuple[PosedCamera, ...], tuple[str, ...]]:
+    """Return the cameras and the photos' names as written.
+
     ``applied_transform`` is undone, so that the world is the one before nerfstudio's
-    reorientation. Raises UnreadableInput naming the file and what is wrong in it.
+    reorientation.
     """
     try:
-        document = json.loads(path.read_text("utf-8"))
-        frames = document["frames"]
+        document = read_json(path)
+        frames = list(document["frames"])
+    except UnreadableInput:
+        raise
     except FileNotFoundError:
         raise UnreadableInput(f"no such file: {path}; check the path") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise UnreadableInput(
             f"{path} is no nerfstudio transforms.json ({error!r}): it needs a list `frames`"
         ) from None
-    undo = _undo_applied(document)
-    cameras, photos = [], []
+    cameras, names = [], []
     for i, frame in enumerate(frames):
         try:
-            cameras.append(_camera({**document, **frame}, undo))
-            photos.append(path.parent / frame["file_path"])
+            cameras.append(_camera({**document, **frame}, _undo_applied(document)))
+            names.append(str(frame["file_path"]))
+        except UnreadableInput:
+            raise
         except (KeyError, TypeError, ValueError, np.linalg.LinAlgError) as error:
             raise UnreadableInput(
                 f"frame {i} of {path} cannot be read ({error!r}): it needs file_path, a 4x4 "
                 "transform_matrix, w, h, fl_x, cx and cy"
             ) from None
-    return tuple(cameras), tuple(photos)
+    return tuple(cameras), tuple(names)
 
 
 def transforms_json(
@@ -97,6 +117,8 @@ def _camera(values: Mapping[str, Any], undo_applied: Float[np.ndarray, "4 4"]) -
         ]
     )
     distortion = np.array([float(values.get(k, 0) or 0) for k in ("k1", "k2", "p1", "p2")])
+    if not all(np.isfinite(part).all() for part in (world_from_camera, K, distortion)):
+        raise ValueError("a number is not finite")
     return PosedCamera(
         Path(values["file_path"]).name,
         (int(values["w"]), int(values["h"])),
@@ -104,6 +126,19 @@ def _camera(values: Mapping[str, Any], undo_applied: Float[np.ndarray, "4 4"]) -
         distortion,
         np.linalg.inv(world_from_camera)[:3],
     )
+
+
+def _inside(path: Path, photo: str) -> Path:
+    """Return the photo that a file names, which must lie in the file's folder or below."""
+    folder = Path(os.path.normpath(path.parent.absolute()))
+    place = Path(os.path.normpath(folder / photo))
+    if "\0" in photo or not place.is_relative_to(folder):
+        raise UnreadableInput(
+            f"{path} names {photo!r}, which lies outside its folder: move the file above the "
+            "photos, link their folder beside it, or give the photos' folder as the capture "
+            f"and the file with --cameras {path}"
+        )
+    return place
 
 
 def _undo_applied(document: Mapping[str, Any]) -> Float[np.ndarray, "4 4"]:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 import shutil
 import tempfile
 from pathlib import Path
 
 from blake3 import blake3
+
+from storage.formats.member_name import is_inside
 
 MANIFEST = "manifest.json"
 
@@ -18,7 +21,12 @@ class PackageError(OSError):
 
 
 def check_writable(folder: Path) -> None:
-    """Raise PackageError if a package cannot be written to ``folder`` (tried, not guessed)."""
+    """Raise PackageError if a package cannot be written to ``folder`` (tried, not guessed).
+
+    A link is refused: what it leads to is not ours to replace.
+    """
+    if folder.is_symlink():
+        raise PackageError(_link(folder))
     if folder.exists() and (not folder.is_dir() or _is_foreign(folder)):
         raise PackageError(
             f"{folder} exists and is not a GARDEN package: choose another --out or --name"
@@ -38,6 +46,8 @@ def write_package(folder: Path, files: dict[str, bytes], source: str) -> None:
     ``folder`` and moved into place at the end, so that a crash leaves the old package;
     a folder that exists and is no package is never touched. Raises PackageError.
     """
+    for name in files:
+        _check_member(name, folder)
     check_writable(folder)
     try:
         staged = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
@@ -58,7 +68,15 @@ def write_package(folder: Path, files: dict[str, bytes], source: str) -> None:
 
 
 def update_package(folder: Path, files: dict[str, bytes]) -> None:
-    """Replace some files of a package, each atomically, and its manifest last."""
+    """Replace some files of a package, each atomically, and its manifest last.
+
+    No link is followed: neither the package's folder nor one inside it may be one.
+    """
+    for name in files:
+        _check_member(name, folder)
+        for place in (folder, *(folder / name).parents[: name.count("/")]):
+            if place.is_symlink():
+                raise PackageError(_link(place))
     manifest = json.loads((folder / MANIFEST).read_bytes())
     try:
         for name, content in files.items():
@@ -71,15 +89,26 @@ def update_package(folder: Path, files: dict[str, bytes]) -> None:
 
 def package_source(folder: Path) -> str | None:
     """Return what the package in ``folder`` was made from, or None if it is incomplete."""
+    if folder.is_symlink():
+        return None
     try:
         manifest = json.loads((folder / MANIFEST).read_bytes())
         complete = all(
-            (folder / name).stat().st_size == entry["bytes"]
+            is_inside(name) and (folder / name).lstat().st_size == entry["bytes"]
             for name, entry in manifest["files"].items()
         )
-    except (OSError, ValueError, KeyError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
     return str(manifest["source"]) if complete else None
+
+
+def _check_member(name: str, folder: Path) -> None:
+    if not is_inside(name) or name == MANIFEST:
+        raise PackageError(f"{name!r} cannot be a file of the package {folder}: it would leave it")
+
+
+def _link(place: Path) -> str:
+    return f"{place} is a link: remove it, or choose another --out or --name"
 
 
 def _is_foreign(folder: Path) -> bool:
@@ -97,9 +126,15 @@ def _replace(staged: Path, folder: Path) -> None:
 
 
 def _write_atomically(path: Path, content: bytes) -> None:
-    partial = path.with_name(f".{path.name}.partial")
-    partial.write_bytes(content)
-    partial.replace(path)
+    descriptor, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+    partial = Path(name)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(content)
+        partial.chmod(0o644)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def _manifest(files: dict[str, bytes], source: str) -> bytes:

@@ -11,13 +11,26 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import UInt8
-from PIL import ExifTags, Image, ImageOps
+from PIL import ExifTags, Image, ImageOps, JpegImagePlugin, PngImagePlugin, WebPImagePlugin
 
 from storage.formats.errors import UnreadableInput
+from storage.formats.limits import check_file_size
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".heic", ".heif")
 MAX_PIXELS = 200_000_000
 """Photos larger than this are refused from their header, before they are decoded."""
+
+MAX_BYTES = 1_000_000_000
+"""Files larger than this are refused unopened; 200 megapixels of 16 bits have 1.2 GB raw."""
+
+CODECS: tuple[str, ...] = (
+    JpegImagePlugin.JpegImageFile.format,
+    PngImagePlugin.PngImageFile.format,
+    WebPImagePlugin.WebPImageFile.format,
+)
+"""What a photo may be, whatever its name says; other formats of Pillow run programs."""
+
+Image.MAX_IMAGE_PIXELS = MAX_PIXELS  # Pillow's own is below what telephones take today
 
 FULL_FRAME_MM = (36.0, 24.0)
 
@@ -37,13 +50,17 @@ class PhotoFile:
 def photo_paths(folder: Path) -> list[Path]:
     """Return the photos in ``folder``, or in its ``images/``, in natural order.
 
-    Raises UnreadableInput if there is no such folder or no photo in it.
+    Hidden files are none. Raises UnreadableInput if there is no such folder or no photo in it.
     """
     if not folder.exists():
         raise UnreadableInput(f"no such folder: {folder}; check the path")
     inner = folder / "images"
     place = inner if inner.is_dir() else folder
-    paths = [p for p in place.iterdir() if p.suffix.lower() in SUFFIXES and p.is_file()]
+    paths = [
+        p
+        for p in place.iterdir()
+        if p.suffix.lower() in SUFFIXES and not p.name.startswith(".") and p.is_file()
+    ]
     if not paths:
         raise UnreadableInput(
             f"no photos in {place}: put JPEG, PNG or HEIC files there (or name another folder)"
@@ -90,16 +107,19 @@ def read_photo(path: Path, max_size: int) -> PhotoFile:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Image.Image]:
+    check_file_size(path, MAX_BYTES, "a photo")
+    codecs = CODECS
     if path.suffix.lower() in (".heic", ".heif"):
         from pillow_heif import register_heif_opener
 
         register_heif_opener()
+        codecs = (*CODECS, "HEIF")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            image = Image.open(path)
+            image = Image.open(path, formats=codecs)
     except Image.DecompressionBombError as error:
-        raise _too_large(path, str(error)) from error
+        raise _too_large(path, f"more than {2 * MAX_PIXELS / 1e6:.0f} megapixels") from error
     except (OSError, SyntaxError, ValueError) as error:
         raise _damaged(path, error) from error
     with image:

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from storage.formats.errors import UnreadableInput
+from storage.formats.limits import check_file_size
 from storage.formats.photos import PhotoFile
 
 SUFFIXES = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm")
@@ -19,6 +20,13 @@ LOOKED_AT = 600
 
 THUMBNAIL = 320
 """Long side in pixels at which sharpness and motion are judged."""
+
+MAX_BYTES = 20_000_000_000
+MAX_PIXELS = 40_000_000
+"""Of one frame; 8K has 33 million."""
+
+MAX_FRAMES = 216_000
+"""An hour at 60 frames a second; all frames up to the last are decoded."""
 
 STILL_SHARE = 0.004
 """Mean motion, as a share of the picture's width, under which two frames show the same."""
@@ -74,18 +82,42 @@ def _look(path: Path) -> list[_Frame]:
 def _frame_count(path: Path) -> int:
     if not path.is_file():
         raise UnreadableInput(f"no such video: {path}; check the path")
-    capture = cv2.VideoCapture(str(path))
+    check_file_size(path, MAX_BYTES, "a video")
+    capture = _open(path)
     try:
         if not capture.isOpened():
             raise UnreadableInput(f"{path} cannot be read as a video: export it as MP4 (H.264)")
-        return int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        width, height, frames = (
+            int(capture.get(what))
+            for what in (
+                cv2.CAP_PROP_FRAME_WIDTH,
+                cv2.CAP_PROP_FRAME_HEIGHT,
+                cv2.CAP_PROP_FRAME_COUNT,
+            )
+        )
     finally:
         capture.release()
+    if width * height > MAX_PIXELS:
+        raise UnreadableInput(
+            f"{path} has frames of {width} x {height} pixels (at most {MAX_PIXELS / 1e6:.0f} "
+            "megapixels): export it with a smaller resolution"
+        )
+    if frames > MAX_FRAMES:
+        raise UnreadableInput(
+            f"{path} has {frames} frames (at most {MAX_FRAMES}): cut out the part that shows "
+            "the room"
+        )
+    return frames
+
+
+def _open(path: Path) -> cv2.VideoCapture:
+    """Open a file with FFmpeg alone: other readers take a name for a pattern or an address."""
+    return cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
 
 
 def _decode(path: Path, wanted: set[int]) -> Iterator[tuple[int, UInt8[np.ndarray, "h w 3"]]]:
     """Decode in order (seeking is unreliable in many containers) and give what is wanted."""
-    capture = cv2.VideoCapture(str(path))
+    capture = _open(path)
     try:
         for index in range(max(wanted, default=-1) + 1):
             if not capture.grab():

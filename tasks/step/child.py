@@ -97,13 +97,15 @@ def obey(order: dict[str, Any], answers: Answers) -> dict[str, Any]:
 
 def describe(error: Exception) -> dict[str, Any]:
     """Return an error as JSON."""
+    from storage.redact import redact
+
     described: dict[str, Any] = {
         "kind": type(error).__name__,
-        "message": str(error),
-        "traceback": "".join(traceback.format_exception(error)),
+        "message": redact(str(error)),
+        "traceback": redact("".join(traceback.format_exception(error))),
     }
     if isinstance(error, OSError) and error.errno is not None:
-        described |= {"errno": error.errno, "message": error.strerror or str(error)}
+        described |= {"errno": error.errno, "message": redact(error.strerror or str(error))}
     for name, attribute in (("object", "object_digest"), ("reason", "reason")):
         if hasattr(error, attribute):
             described[name] = getattr(error, attribute)

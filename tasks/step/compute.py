@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import threading
 import time
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from garden_models.progress import Progress
 from garden_models.scene import Verdict
 from storage import Published
+from storage.redact import redact, redacted
 from tasks.step.inputs import Arguments, load_inputs
 from tasks.step.memory import peak_memory
 from tasks.step.ref import Cancelled, Seconds
@@ -48,13 +50,22 @@ def compute(
         if step.takes_progress:
             extra["progress"] = stoppable(context.cancelled, report)
         seed_everything(step.spec.seed, with_torch="torch" in step.spec.packages)
-        result = step.fn(**arguments.plain, **values, **extra)
+        result = without_secrets_in_verdict(step.fn(**arguments.plain, **values, **extra))
         computed = time.monotonic()
         del values
         published = context.store.publish(result)
         stored = time.monotonic()
     seconds = Seconds(loaded - started, computed - loaded, stored - computed)
     return Done(published, verdict_of(result), seconds, peak.mb)
+
+
+def without_secrets_in_verdict(value: Any) -> Any:
+    """Return a value whose reasons may be kept: some repeat what a library or server said."""
+    verdict = verdict_of(value)
+    reasons = redacted(verdict.reasons)
+    if reasons == verdict.reasons:
+        return value
+    return dataclasses.replace(value, verdict=Verdict(verdict.status, reasons))
 
 
 def verdict_of(value: object) -> Verdict:
@@ -77,6 +88,6 @@ def stoppable(cancelled: threading.Event, report: Callable[[float, str], None]) 
         now = time.monotonic()
         if now - last >= _PROGRESS_EVERY_S or share >= 1.0:
             last = now
-            report(share, doing)
+            report(share, redact(doing))
 
     return progress

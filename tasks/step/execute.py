@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from garden_models.scene import BadGeometry, BadInput
 from storage import ActionRecord, Output, StoreError
+from storage.redact import redact
 from tasks.step.budget import Held, is_holding
 from tasks.step.compute import Done, compute
 from tasks.step.inputs import Arguments, each
@@ -141,6 +142,8 @@ def execute(call: Call, lost: str = "") -> Ref:
         failure = _failure(call, error)
         seconds = Seconds(compute=time.monotonic() - started)
         _finished(call, "failed", seconds, why=why, error=failure.reason)
+        if failure.reason != _reason(error):  # a secret in it must not get out as the cause
+            raise failure from None
         raise failure from error
 
 
@@ -241,14 +244,23 @@ def _failure(call: Call, error: Exception) -> StepFailed:
     """Return a step's error as the user shall read it; its own sentence if it has one."""
     if isinstance(error, StepFailed) and error.step == call.step.name:
         return error
-    kind = type(error).__name__
+    return StepFailed(
+        call.step.name,
+        call.label,
+        redact(_reason(error)),
+        kind=type(error).__name__,
+        retryable=is_transient(error),
+    )
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, StepFailed):
+        return error.reason
     if isinstance(error, _SPEAKING):
-        reason = str(error)
-    elif isinstance(error, MemoryError):
-        reason = "out of memory: close other programs or choose a smaller image size"
-    else:
-        reason = f"{kind}: {error}"
-    return StepFailed(call.step.name, call.label, reason, kind=kind, retryable=is_transient(error))
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "out of memory: close other programs or choose a smaller image size"
+    return f"{type(error).__name__}: {error}"
 
 
 @contextmanager

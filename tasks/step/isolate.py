@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 from garden_models import scene
 from storage import CorruptArtifact, Published, errors
+from storage.redact import redact
 from tasks.step.compute import Done
 from tasks.step.inputs import Arguments
 from tasks.step.memory import Peak, session_rss
@@ -35,7 +36,8 @@ if TYPE_CHECKING:
 
 _POLL_S = 0.1
 _WEIGH_EVERY_S = 0.3
-_TAIL_BYTES = 2000
+_TAIL_CHARACTERS = 2000
+_READ_BYTES = 1 << 16
 
 
 def compute_isolated(
@@ -99,11 +101,14 @@ class _Child:
     silent: bool = False  # it has closed its end of the pipe
 
     def tail(self) -> str:
-        """Return the end of what the child printed."""
+        """Return the end of what the child printed, cut after secrets are out of it."""
         try:
-            return self.output.read_bytes()[-_TAIL_BYTES:].decode(errors="replace").strip()
+            with self.output.open("rb") as printed:
+                printed.seek(max(0, self.output.stat().st_size - _READ_BYTES))
+                text = printed.read().decode(errors="replace")
         except OSError:
             return ""
+        return redact(text)[-_TAIL_CHARACTERS:].strip()
 
     def kill(self) -> None:
         """End the child and all that it started."""

@@ -9,6 +9,7 @@ from typing import Any
 
 from storage.canonical import UNKEYED, is_array, plain_scalar
 from storage.digest import digest_value
+from storage.redact import redact, redacted
 from tasks.step.code import Code
 from tasks.step.files import file_changes, split_files
 from tasks.step.ref import Why
@@ -50,15 +51,18 @@ class KeyParts:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Return what an action record keeps, so that a later run can say what changed."""
+        """Return what an action record keeps, so that a later run can say what changed.
+
+        Secrets among the settings count in the key but are not kept.
+        """
         return {
             "version": self.version,
             "inputs": _flat(self.inputs),
-            "config": _flat(self.config),
+            "config": redacted(_flat(self.config)),
             "code": self.code.modules,
             "packages": self.code.packages,
-            "backend": self.backend,
-            "weights": self.weights,
+            "backend": redact(self.backend),
+            "weights": redacted(self.weights),
             "seed": self.seed,
         }
 

@@ -127,3 +127,22 @@ def test_a_rerun_replaces_what_is_told_of_the_run(values: SceneValues, page: str
     assert "12.3 s" not in told
     assert "photo a.jpg changed" not in told
     assert len(told) == pytest.approx(len(page), abs=200)
+
+
+def test_names_from_outside_bring_no_markup(values: SceneValues) -> None:
+    """Photos are called what their sender called them; a report is passed on and opened."""
+    hostile = "\"><img src=x onerror='alert(1)'>.jpg"
+    assert values.reconstruction and values.gravity_view
+    renamed = replace(
+        values,
+        reconstruction=replace(
+            values.reconstruction,
+            views=tuple(replace(v, photo=hostile) for v in values.reconstruction.views),
+            unregistered=(hostile,),
+        ),
+        gravity_view=replace(values.gravity_view, reference_photo=hostile),
+    )
+    page = report_page(renamed, report_document(renamed))
+    assert "onerror=&#x27;alert" in page
+    assert "<img src=x" not in page
+    assert "onerror='" not in page

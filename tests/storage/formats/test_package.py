@@ -79,3 +79,61 @@ def test_an_update_keeps_the_rest_and_the_source(tmp_path: Path) -> None:
     update_package(folder, {"report.json": b'{"executed": 0}'})
     assert package_source(folder) == "b3:1"
     assert (folder / "a.txt").read_bytes() == b"a"
+
+
+@pytest.mark.parametrize("name", ["../a.txt", "/etc/a.txt", "a/../../b", "a\\b", "", MANIFEST])
+def test_no_file_leaves_the_package(tmp_path: Path, name: str) -> None:
+    folder = tmp_path / "out" / "desk"
+    with pytest.raises(PackageError, match="cannot be a file of the package"):
+        write_package(folder, {"a.txt": b"a", name: b"x"}, "b3:1")
+    assert not [p for p in tmp_path.rglob("*") if p.is_file()]
+    write_package(folder, {"a.txt": b"a"}, "b3:1")
+    with pytest.raises(PackageError, match="cannot be a file of the package"):
+        update_package(folder, {name: b"x"})
+
+
+def test_a_package_that_is_a_link_is_refused_and_what_it_leads_to_stays(tmp_path: Path) -> None:
+    real = tmp_path / "real"
+    write_package(real, {"a.txt": b"a", "report.json": b"{}"}, "b3:1")
+    link = tmp_path / "desk"
+    link.symlink_to(real)
+    assert package_source(link) is None
+    for change in (
+        lambda: write_package(link, {"a.txt": b"new"}, "b3:2"),
+        lambda: update_package(link, {"report.json": b"new"}),
+    ):
+        with pytest.raises(PackageError, match="is a link"):
+            change()
+    assert (real / "report.json").read_bytes() == b"{}"
+    assert package_source(real) == "b3:1"
+
+
+def test_links_inside_a_package_are_not_followed(tmp_path: Path) -> None:
+    folder, outside = tmp_path / "desk", tmp_path / "outside"
+    outside.mkdir()
+    (outside / "report.json").write_bytes(b"mine")
+    write_package(folder, {"report.json": b"{}", "assets/a.txt": b"a"}, "b3:1")
+    (folder / "report.json").unlink()
+    (folder / "report.json").symlink_to(outside / "report.json")
+    (folder / ".report.json.partial").symlink_to(outside / "report.json")
+    update_package(folder, {"report.json": b"new"})
+    assert (outside / "report.json").read_bytes() == b"mine"
+    assert (folder / "report.json").read_bytes() == b"new"
+    (folder / "assets" / "a.txt").unlink()
+    (folder / "assets").rmdir()
+    (folder / "assets").symlink_to(outside)
+    with pytest.raises(PackageError, match="assets is a link"):
+        update_package(folder, {"assets/report.json": b"new"})
+    write_package(folder, {"assets/report.json": b"whole"}, "b3:2")
+    assert (outside / "report.json").read_bytes() == b"mine"
+    assert (folder / "assets" / "report.json").read_bytes() == b"whole"
+
+
+def test_a_manifest_that_names_files_outside_counts_as_none(tmp_path: Path) -> None:
+    folder = tmp_path / "desk"
+    write_package(folder, {"a.txt": b"a"}, "b3:1")
+    (tmp_path / "b.txt").write_bytes(b"b")
+    manifest = json.loads((folder / MANIFEST).read_text())
+    manifest["files"]["../b.txt"] = manifest["files"]["a.txt"]
+    (folder / MANIFEST).write_text(json.dumps(manifest))
+    assert package_source(folder) is None
