@@ -20,6 +20,12 @@ from storage.members import MemberReader, MemberWriter
 
 if TYPE_CHECKING:
     from zarr.abc.codec import BytesBytesCodec
+    from zarr.core.common import JSON
+
+CHUNK_KEYS: dict[str, JSON] = {"name": "default", "separator": "."}
+"""An array's chunks lie side by side: a folder an axis would have to be made, synchronised
+and listed for each of them.
+"""
 
 
 def write_arrays(packs: list[Pack], arrays: dict[str, Any], members: MemberWriter) -> None:
@@ -36,6 +42,7 @@ def write_arrays(packs: list[Pack], arrays: dict[str, Any], members: MemberWrite
             shards=pack.shards,
             compressors=_compressors(first.dtype),
             fill_value=False if first.dtype.kind == "b" else 0,
+            chunk_key_encoding=CHUNK_KEYS,
             config={"write_empty_chunks": True},
         )
         if 0 not in pack.shape:

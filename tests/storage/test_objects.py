@@ -105,7 +105,7 @@ def test_flips_inside_one_chunk_of_a_shard_are_found_by_partial_reads(store: Sto
     rng = np.random.default_rng(0)
     value = dataclasses.replace(scene(views=0), points=rng.random((400_000, 3)))
     digest = store.publish(value).object
-    shard = store.folder(digest) / "points" / "c" / "0" / "0"
+    shard = store.folder(digest) / "points" / "c.0.0"
     data = bytearray(shard.read_bytes())
     data[100] ^= 1
     shard.chmod(0o644)
