@@ -6,11 +6,13 @@ that the manifest's list of members tells empty from missing.
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import zarr
 from zarr.codecs import BloscCodec, Crc32cCodec, ZstdCodec
+from zarr.storage import StorePath
 
 from storage.canonical import little_endian
 from storage.codec.packing import Pack, Place
@@ -31,7 +33,12 @@ and listed for each of them.
 def write_arrays(packs: list[Pack], arrays: dict[str, Any], members: MemberWriter) -> None:
     """Write the packed arrays; the root group's metadata is left to the caller."""
     store = WritingStore(members)
-    root = zarr.create_group(store, zarr_format=3)
+    fill_group(zarr.create_group(store, zarr_format=3), packs, arrays)
+    store.flush()
+
+
+def fill_group(root: zarr.Group, packs: list[Pack], arrays: dict[str, Any]) -> None:
+    """Write the packed arrays into a Zarr group, wherever it lies."""
     for pack in packs:
         first = arrays[pack.leaves[0]]
         target = root.create_array(
@@ -47,7 +54,6 @@ def write_arrays(packs: list[Pack], arrays: dict[str, Any], members: MemberWrite
         )
         if 0 not in pack.shape:
             _fill(target, pack, arrays)
-    store.flush()
 
 
 def _fill(target: zarr.Array, pack: Pack, arrays: dict[str, Any]) -> None:
@@ -76,18 +82,20 @@ class ArrayReader:
 
     def __init__(self, members: MemberReader) -> None:
         self._members = members
-        self._group = zarr.open_group(ReadingStore(members), mode="r", zarr_format=3)
+        self._store = ReadingStore(members)
         self._whole: dict[str, np.ndarray] = {}
 
     def open(self, name: str) -> zarr.Array:
         """Return a Zarr array to be sliced; CorruptArtifact if it is not there."""
+        place = f"{name}/zarr.json"
+        if place not in self._members:
+            raise CorruptArtifact(self._members.digest, f"array {name} is missing")
         try:
-            array = self._group[name]
-        except KeyError:
-            raise CorruptArtifact(self._members.digest, f"array {name} is missing") from None
-        if not isinstance(array, zarr.Array):
-            raise CorruptArtifact(self._members.digest, f"{name} is no array")
-        return array
+            # Built from its metadata: asking the group for it is three waits for Zarr's thread.
+            metadata = json.loads(self._members.get(place))
+            return zarr.Array(zarr.AsyncArray.from_dict(StorePath(self._store, name), metadata))
+        except (ValueError, TypeError, KeyError) as error:
+            raise CorruptArtifact(self._members.digest, f"{name} is no array: {error}") from error
 
     def leaf(self, place: Place) -> np.ndarray:
         """Return the array that lies at ``place`` (see ``packing.Place``)."""
