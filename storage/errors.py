@@ -25,6 +25,10 @@ class StoreReadOnly(StoreError):
     """The store cannot be written to."""
 
 
+class StoreDenied(StoreError):
+    """The store's server does not let these credentials see it."""
+
+
 class MissingArtifact(StoreError):
     """An object is not in the store."""
 

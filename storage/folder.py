@@ -13,7 +13,7 @@ from pathlib import Path
 
 from storage import _os, staging
 from storage.digest import digest_file, hexadecimal
-from storage.errors import StoreError, explain_os_error
+from storage.errors import StoreError, StoreFormatError, explain_os_error
 from storage.folder_leases import FolderLeases
 from storage.leases import LEASE_S
 from storage.manifest import MANIFEST
@@ -25,6 +25,7 @@ class FolderMedium:
     """A store's folder. See ``Medium`` for what the methods promise."""
 
     recheck: Level = "full"
+    readers = 1
 
     def __init__(self, path: Path, *, durable: bool = True, lease_s: float = LEASE_S) -> None:
         self.path = path
@@ -34,7 +35,10 @@ class FolderMedium:
         self._swept = False
 
     def prepare(self) -> None:
-        """Make the folder."""
+        """Make the folder; StoreFormatError if it holds something else."""
+        present = {p.name for p in self.path.iterdir()} if self.path.is_dir() else set()
+        if present - {"tmp"}:
+            raise StoreFormatError(f"{self.path} is not empty and no store: choose an empty folder")
         _os.ensure_folder(self.path, durable=self.durable)
 
     # -- documents ------------------------------------------------------------------------
@@ -118,6 +122,9 @@ class FolderMedium:
         if self.durable:
             _os.active.fsync(target.parent)
         return True
+
+    def refresh(self, digest: str, manifest: bytes) -> None:
+        """Do nothing: a collector is held off by ``publishing``, not by age."""
 
     def objects(self) -> Iterator[str]:
         """Give the digest of every object folder, sorted."""

@@ -29,6 +29,17 @@ class Medium(Protocol):
     """How thoroughly an object that is already there is checked before it counts as published
     again: as much as is cheap beside writing it."""
 
+    readers: int
+    """How many members are best read at once; 1 where reading one already takes all there is."""
+
+    def prepare(self) -> None:
+        """Make the place for a new store.
+
+        Raises:
+            StoreMissing: the place cannot be made from here.
+            StoreFormatError: it holds something else.
+        """
+
     @property
     def leases(self) -> LeaseTable:
         """Who computes which key."""
@@ -60,6 +71,9 @@ class Medium(Protocol):
 
         False if somebody else has: theirs stays.
         """
+
+    def refresh(self, digest: str, manifest: bytes) -> None:
+        """Keep an object from a collector that goes by age, since it is published again."""
 
     def objects(self) -> Iterator[str]:
         """Give the digest of every object, sorted."""

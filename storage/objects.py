@@ -33,7 +33,9 @@ def seal(medium: Medium, staged: MemberWriter, manifest: Manifest) -> Published:
     """
     data = manifest.to_bytes()
     digest = digest_bytes(data)
-    if not _is_whole(medium, digest) and not medium.seal(staged, digest, data):
+    if _is_whole(medium, digest):
+        medium.refresh(digest, data)
+    elif not medium.seal(staged, digest, data):
         verify(medium, digest, medium.recheck)  # somebody was faster
     return Published(digest, manifest.content, manifest.kind, manifest.size)
 

@@ -13,6 +13,7 @@ from typing import Any, Literal, TypeVar
 
 from storage import actions, objects
 from storage.actions import ActionRecord
+from storage.address import find_medium
 from storage.check import Problem, check_store
 from storage.errors import (
     CorruptArtifact,
@@ -32,6 +33,7 @@ from storage.search import matches
 
 FORMAT = 1
 HASH = "blake3-256"
+_KNOWN = {"format": FORMAT, "hash": HASH}
 _MARKER = "store.json"
 
 T = TypeVar("T")
@@ -57,29 +59,32 @@ class Store:
         """Open the store at ``address``; make a new one there if ``create``.
 
         Args:
-            address: the store's folder.
+            address: the store's folder, or ``s3://BUCKET/PREFIX``.
             create: whether to make a new store if there is none.
             durability: ``none`` skips fsync (for tests).
             verify: how thoroughly a hit is checked before it counts.
             lease_s: seconds after which a lease that is not renewed ends.
 
         Raises:
-            StoreMissing: there is none and ``create`` is False.
-            StoreFormatError: the folder holds something else, or an unknown format.
+            StoreMissing: there is none and ``create`` is False, or there is no such bucket.
+            StoreFormatError: the place holds something else, or an unknown format.
+            StoreDenied: the bucket's server refuses the credentials.
             StoreFull, StoreReadOnly: it cannot be made there.
         """
-        medium = FolderMedium(
-            Path(address).expanduser().absolute(), durable=durability == "full", lease_s=lease_s
-        )
+        medium = find_medium(address, durable=durability == "full", lease_s=lease_s)
         store = cls(medium, verify=verify)
-        if not (medium.path / _MARKER).exists():
+        marker = store._marker()
+        if marker is None:
             if not create:
                 raise StoreMissing(
-                    f"there is no store at {medium.address}: give its folder with --store or"
-                    " GARDEN_STORE"
+                    f"there is no store at {medium.address}: give its folder or bucket with"
+                    " --store or GARDEN_STORE"
                 )
-            store._create(medium)
-        store._check_format()
+            with store._explained():
+                medium.prepare()
+                medium.create(_MARKER, json.dumps(_KNOWN, sort_keys=True).encode())
+            marker = store._marker()
+        store._check_format(marker)
         return store
 
     @property
@@ -107,22 +112,20 @@ class Store:
             raise StoreError(f"the store {self.address} is not in a folder")
         return self.medium
 
-    def _create(self, medium: FolderMedium) -> None:
-        path = medium.path
-        document = json.dumps({"format": FORMAT, "hash": HASH}, sort_keys=True).encode()
-        with self._explained():
-            present = {p.name for p in path.iterdir()} if path.is_dir() else set()
-            if present - {"tmp", _MARKER}:
-                raise StoreFormatError(f"{path} is not empty and no store: choose an empty folder")
-            medium.prepare()
-            medium.create(_MARKER, document)
-
-    def _check_format(self) -> None:
+    def _marker(self) -> bytes | None:
         try:
-            document = json.loads(self.medium.read(_MARKER) or b"")
-        except (OSError, ValueError) as error:
+            return self.medium.read(_MARKER)
+        except (ConnectionError, TimeoutError):
+            raise
+        except OSError as error:
             raise StoreFormatError(f"{self.address}/{_MARKER} cannot be read: {error}") from error
-        if document != {"format": FORMAT, "hash": HASH}:
+
+    def _check_format(self, marker: bytes | None) -> None:
+        try:
+            document = json.loads(marker or b"")
+        except ValueError as error:
+            raise StoreFormatError(f"{self.address}/{_MARKER} cannot be read: {error}") from error
+        if document != _KNOWN:
             raise StoreFormatError(
                 f"the store {self.address} is of format {document}, this version knows only"
                 f" format {FORMAT} with {HASH}: use the version that made it, or another store"

@@ -74,6 +74,7 @@ class ValueReader:
     def value(self, expected: object) -> Any:
         """Return the whole value as ``expected`` (a class or a type hint)."""
         self._check(expected)
+        self._members.read_ahead()
         value = trees.decode(self._tree, expected, self._leaf)
         self._members.check_rest()
         return value

@@ -5,6 +5,7 @@ A chunk that the manifest lists but the disk lacks is corruption, never a fill v
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator, Iterable
 
 from zarr.abc.store import (
@@ -110,6 +111,11 @@ class ReadingStore(Store):
         """Return a member or a part of it; None if the object never had it."""
         if key not in self._members:
             return None
+        if self._members.readers > 1:  # what is far away is waited for elsewhere
+            return await asyncio.to_thread(self._get, key, prototype, byte_range)
+        return self._get(key, prototype, byte_range)
+
+    def _get(self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None) -> Buffer:
         if byte_range is None:
             return prototype.buffer.from_bytes(self._members.get(key))
         start, stop = _span(byte_range, self._members.manifest.members[key].size)

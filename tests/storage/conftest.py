@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import uuid
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -7,11 +8,16 @@ import pytest
 
 from storage import Store
 from storage.leases import Lease, LeaseTable
+from tests.s3_server import BUCKET
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Store:
-    return Store.open(tmp_path / "store", durability="none")
+def store(tmp_path: Path, request: pytest.FixtureRequest) -> Store:
+    """A new store: in a folder, or on whatever ``on_any_medium`` asks for."""
+    if getattr(request, "param", "folder") == "folder":
+        return Store.open(tmp_path / "store", durability="none")
+    request.getfixturevalue("s3")
+    return Store.open(f"s3://{BUCKET}/{uuid.uuid4().hex}/store")
 
 
 @pytest.fixture(autouse=True)

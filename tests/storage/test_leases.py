@@ -6,14 +6,15 @@ import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
 
 from storage import Store
 from storage.digest import digest_value
+from tests.storage.media import behind, on_any_medium
 
 KEY = digest_value("key", domain="test/1")
 
 
+@on_any_medium
 def test_only_one_holds_a_lease(store: Store) -> None:
     lease = store.acquire(KEY)
     assert lease is not None
@@ -27,13 +28,14 @@ def test_only_one_holds_a_lease(store: Store) -> None:
     assert store.leases.holder(KEY) == again
 
 
+@on_any_medium
 def test_of_many_racing_threads_one_wins(store: Store) -> None:
     won: list[object] = []
     start = threading.Barrier(8)
 
     def race() -> None:
         start.wait()
-        lease = Store.open(store.path).acquire(KEY)
+        lease = Store.open(store.address).acquire(KEY)
         if lease is not None:
             won.append(lease)
 
@@ -45,19 +47,21 @@ def test_of_many_racing_threads_one_wins(store: Store) -> None:
     assert len(won) == 1
 
 
+@on_any_medium
 def test_a_dead_owners_lease_is_taken_over_at_once(store: Store) -> None:
     code = (
         "import os, sys; from storage import Store\n"
         f"assert Store.open(sys.argv[1]).acquire({KEY!r}); os._exit(9)"
     )
-    subprocess.run([sys.executable, "-c", code, str(store.path)], check=False)
-    assert len(list((store.path / "leases").glob("*.json"))) == 1
+    subprocess.run([sys.executable, "-c", code, store.address], check=False)
+    assert behind(store).names("leases/")
     assert store.leases.holder(KEY) is None
     assert store.acquire(KEY) is not None
 
 
-def test_a_lease_that_is_not_renewed_ends(tmp_path: Path) -> None:
-    store = Store.open(tmp_path / "store", lease_s=0.3)
+@on_any_medium
+def test_a_lease_that_is_not_renewed_ends(store: Store) -> None:
+    store = Store.open(store.address, lease_s=0.3)
     lease = store.acquire(KEY)
     assert lease is not None
     store.leases.abandon_all()
@@ -66,8 +70,9 @@ def test_a_lease_that_is_not_renewed_ends(tmp_path: Path) -> None:
     assert store.acquire(KEY) is not None
 
 
-def test_a_lease_is_renewed_while_its_owner_works(tmp_path: Path) -> None:
-    store = Store.open(tmp_path / "store", lease_s=0.3)
+@on_any_medium
+def test_a_lease_is_renewed_while_its_owner_works(store: Store) -> None:
+    store = Store.open(store.address, lease_s=0.3)
     assert store.acquire(KEY) is not None
     time.sleep(0.8)
-    assert Store.open(store.path).acquire(KEY) is None
+    assert Store.open(store.address).acquire(KEY) is None

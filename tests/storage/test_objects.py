@@ -12,35 +12,47 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from storage import CorruptArtifact, MissingArtifact, Store, StoreFormatError
+from storage.bucket import object_prefix
 from storage.digest import digest_bytes
 from storage.manifest import Manifest
+from tests.storage.media import behind, files_of, on_any_medium, on_any_medium_slowly
 from tests.storage.samples import Scene, scene
 
 
-def all_files(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.rglob("*") if path.is_file())
-
-
+@on_any_medium
 def test_self_naming_and_sealed(store: Store) -> None:
     digest = store.publish(scene()).object
-    folder = store.folder(digest)
-    data = (folder / "manifest.json").read_bytes()
+    place = f"objects/b3/{digest[3:5]}/{digest[5:]}/"
+    data = behind(store).get(place + "manifest.json")
     assert digest_bytes(data) == digest
-    assert folder.name == digest[5:]
     members = Manifest.from_bytes(data).members
-    assert {str(p.relative_to(folder)) for p in all_files(folder)} == {*members, "manifest.json"}
-    assert all(not path.stat().st_mode & 0o222 for path in all_files(folder))
+    names = {name.removeprefix(place) for name in behind(store).names(place)}
+    assert names == {*members, "manifest.json"}
     assert store.verify("full") == []
 
 
+def test_files_are_read_only_and_written_once(store: Store) -> None:
+    def files() -> dict[Path, tuple[int, int]]:
+        found = (path for path in (store.path / "objects").rglob("*") if path.is_file())
+        return {path: (path.stat().st_mtime_ns, path.stat().st_mode & 0o222) for path in found}
+
+    store.publish(scene())
+    before = files()
+    store.publish(scene())
+    assert files() == before
+    assert {writable for _time, writable in before.values()} == {0}
+
+
+@on_any_medium
 def test_write_once_publishing_again_changes_nothing(store: Store) -> None:
     first = store.publish(scene())
-    before = {path: path.stat().st_mtime_ns for path in all_files(store.path / "objects")}
+    before = behind(store).names("")
     assert store.publish(scene()) == first
-    assert {p: p.stat().st_mtime_ns for p in all_files(store.path / "objects")} == before
-    assert list((store.path / "tmp").iterdir()) == []
+    assert behind(store).names("") == before
+    assert not [name for name in before if name.startswith("tmp/")]
 
 
+@on_any_medium
 def test_many_threads_publish_one_object(store: Store) -> None:
     found: list[str] = []
     threads = [
@@ -56,6 +68,7 @@ def test_many_threads_publish_one_object(store: Store) -> None:
     assert store.verify("full") == []
 
 
+@on_any_medium_slowly
 @settings(
     max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
@@ -64,68 +77,73 @@ def test_hit_means_verified_no_flipped_bit_reaches_a_caller(
     store: Store, data: st.DataObject
 ) -> None:
     digest = store.publish(scene()).object
-    path = data.draw(st.sampled_from(all_files(store.folder(digest))))
-    original = path.read_bytes()
+    name = data.draw(st.sampled_from(files_of(store, digest)))
+    original = behind(store).get(name)
     bit = data.draw(st.integers(0, 8 * len(original) - 1))
     changed = bytearray(original)
     changed[bit // 8] ^= 1 << bit % 8
-    path.chmod(0o644)
-    path.write_bytes(bytes(changed))
+    behind(store).put(name, bytes(changed))
     with pytest.raises(CorruptArtifact):
         store.read(digest, Scene)
     assert len(store.verify("full")) == 1
-    path.write_bytes(original)
+    behind(store).put(name, original)
     store.read(digest, Scene)
 
 
+@on_any_medium
 @pytest.mark.parametrize("damage", ["truncated", "missing", "extra"])
 def test_damaged_members_are_found_by_the_quick_check(store: Store, damage: str) -> None:
     digest = store.publish(scene()).object
-    folder = store.folder(digest)
-    for path in all_files(folder):
-        original = path.read_bytes()
-        path.chmod(0o644)
+    there = behind(store)
+    for name in files_of(store, digest):
+        if damage == "missing" and name.endswith("/manifest.json"):
+            continue
+        original = there.get(name)
+        more = name.rpartition("/")[0] + "/more"
         if damage == "truncated":
-            path.write_bytes(original[:-1])
+            there.put(name, original[:-1])
         elif damage == "missing":
-            path.unlink()
+            there.delete(name)
         else:
-            (folder / "more").write_bytes(b"")
-        assert len(store.verify("manifest")) == 1, path
+            there.put(more, b"x")
+        assert len(store.verify("manifest")) == 1, name
         with pytest.raises(CorruptArtifact):
             store.read(digest, Scene)
-        path.write_bytes(original)
-        (folder / "more").unlink(missing_ok=True)
+        there.put(name, original)
+        if damage == "extra":
+            there.delete(more)
     assert store.verify("full") == []
 
 
+@on_any_medium
 def test_flips_inside_one_chunk_of_a_shard_are_found_by_partial_reads(store: Store) -> None:
     import numpy as np
 
     rng = np.random.default_rng(0)
     value = dataclasses.replace(scene(views=0), points=rng.random((400_000, 3)))
     digest = store.publish(value).object
-    shard = store.folder(digest) / "points" / "c.0.0"
-    data = bytearray(shard.read_bytes())
+    [shard] = [name for name in files_of(store, digest) if name.endswith("/points/c.0.0")]
+    data = bytearray(behind(store).get(shard))
     data[100] ^= 1
-    shard.chmod(0o644)
-    shard.write_bytes(bytes(data))
+    behind(store).put(shard, bytes(data))
     array, _place = store.read_array(digest, "points")
     assert np.array_equal(array[390_000:], value.points[390_000:])
     with pytest.raises(Exception, match=r"(?i)checksum"):
         array[:10]
 
 
+@on_any_medium
 def test_a_damaged_object_is_replaced_by_publishing_again(store: Store) -> None:
     digest = store.publish(scene()).object
-    member = store.folder(digest) / "zarr.json"
-    member.chmod(0o644)
-    member.write_bytes(b"{}" + b" " * (member.stat().st_size - 2))
+    root = object_prefix(digest) + "zarr.json"
+    behind(store).put(root, b"{}")
     assert store.publish(scene()).object == digest
     assert store.verify("full") == []
-    assert len(list((store.path / "quarantine").iterdir())) == 1
+    wards = {name.split("/")[1] for name in behind(store).names("quarantine/")}
+    assert len(wards) == 1
 
 
+@on_any_medium
 def test_a_missing_object_says_so(store: Store) -> None:
     with pytest.raises(MissingArtifact, match="not in the store"):
         store.read("b3:" + "0" * 64, Scene)

@@ -26,8 +26,10 @@ from storage import (
     StoreMissing,
     StoreReadOnly,
 )
+from storage.bucket import object_prefix
 from storage.digest import digest_value
 from tests.storage.faulty import FaultyOs, disk
+from tests.storage.media import behind, lose, on_any_medium
 from tests.storage.samples import Scene, View, scene
 
 SMALL = View("a.jpg", np.zeros((3, 4, 3), np.uint8), np.eye(3))
@@ -65,6 +67,7 @@ def test_opening(tmp_path: Path) -> None:
         Store.open(tmp_path / "a" / "b")
 
 
+@on_any_medium
 def test_recorded_actions_are_found(store: Store) -> None:
     record = record_of(store)
     assert store.lookup(record.key) == (None, "absent")
@@ -81,28 +84,31 @@ def test_recorded_actions_are_found(store: Store) -> None:
     assert store.size() > 0
 
 
+@on_any_medium
 def test_write_once_first_action_wins_and_conflicts_are_kept(store: Store) -> None:
     first, second = record_of(store), record_of(store, SMALL)
     assert store.record(first) == first
     assert store.record(dataclasses.replace(first, host="other")) == first
-    assert not (store.path / "conflicts").exists()
+    assert behind(store).names("conflicts/") == []
     assert store.record(second) == first
-    [conflict] = (store.path / "conflicts").rglob("*.json")
-    assert ActionRecord.from_bytes(conflict.read_bytes()) == second
+    [conflict] = behind(store).names("conflicts/")
+    assert ActionRecord.from_bytes(behind(store).get(conflict)) == second
     assert store.lookup(first.key) == (first, "hit")
 
 
+@on_any_medium
 def test_no_dangling_action_without_its_object(store: Store) -> None:
     record = record_of(store)
-    shutil.rmtree(store.folder(record.outputs["value"].object))
+    lose(store, record.outputs["value"].object)
     with pytest.raises(MissingArtifact):
         store.record(record)
     assert list(store.actions()) == []
 
 
+@on_any_medium
 def test_a_lost_object_makes_its_actions_misses(store: Store) -> None:
     record = store.record(record_of(store))
-    shutil.rmtree(store.folder(record.outputs["value"].object))
+    lose(store, record.outputs["value"].object)
     assert len(store.verify()) == 1
     assert store.lookup(record.key, mend=False) == (None, "evicted")
     assert store.lookup(record.key) == (None, "evicted")
@@ -110,31 +116,34 @@ def test_a_lost_object_makes_its_actions_misses(store: Store) -> None:
     assert store.verify() == []
 
 
+@on_any_medium
 def test_a_damaged_object_goes_to_quarantine_with_all_its_actions(store: Store) -> None:
     record = store.record(record_of(store))
     other = store.record(record_of(store, name="other"))
-    (store.folder(record.outputs["value"].object) / "zarr.json").unlink()
+    behind(store).delete(object_prefix(record.outputs["value"].object) + "zarr.json")
     assert store.lookup(record.key, mend=False) == (None, "corrupt")
     assert store.lookup(record.key) == (None, "corrupt")
     assert store.lookup(other.key) == (None, "absent")
-    assert len(list((store.path / "quarantine").iterdir())) == 1
+    assert behind(store).names("quarantine/") != []
     assert store.verify() == []
 
 
+@on_any_medium
 def test_derived_pointers_can_be_deleted(store: Store) -> None:
     """CATALOG-IS-DERIVED, as far as ``latest/`` goes."""
     record = store.record(record_of(store))
     store.remember_latest(record, "kitchen", "bulldozer")
-    shutil.rmtree(store.path / "latest")
+    for name in behind(store).names("latest/"):
+        behind(store).delete(name)
     assert store.lookup(record.key) == (record, "hit")
     assert store.latest("kitchen", "segment", "bulldozer") is None
 
 
+@on_any_medium
 def test_an_unreadable_action_counts_as_none(store: Store) -> None:
     record = store.record(record_of(store))
-    [path] = (store.path / "actions").rglob("*.json")
-    path.chmod(0o644)
-    path.write_text("{")
+    [name] = behind(store).names("actions/")
+    behind(store).put(name, b"{")
     assert len(store.verify()) == 1
     assert store.lookup(record.key) == (None, "absent")
     assert store.record(record) == record
@@ -202,9 +211,10 @@ def test_source_files_count_by_content(tmp_path: Path) -> None:
     assert SourceFile.of(tmp_path / "b" / "photo.jpg") != one
 
 
+@on_any_medium
 def test_action_records_are_plain_json(store: Store) -> None:
     store.record(record_of(store))
-    [path] = (store.path / "actions").rglob("*.json")
-    document = json.loads(path.read_text())
+    [name] = behind(store).names("actions/")
+    document = json.loads(behind(store).get(name))
     assert document["format"] == 1
     assert document["outputs"]["value"]["kind"] == "Scene"
