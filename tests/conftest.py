@@ -37,4 +37,5 @@ def s3(s3_process: S3Server, monkeypatch: pytest.MonkeyPatch) -> S3Server:
     for name, value in s3_process.environment.items():
         monkeypatch.setenv(name, value)
     s3_process.fail(0)
+    s3_process.counted()
     return s3_process

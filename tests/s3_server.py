@@ -79,12 +79,16 @@ class S3Server:
     def fail(self, times: int = 1, **fault: Any) -> None:
         """Have requests fail: ``method``, ``path`` (a part of it), ``status``, ``code``.
 
-        Status 0 closes the connection before anything is done, status 1 after it was done.
+        Status 0 closes the connection before anything is done, status 1 after it was done;
+        status 200 does the request ``delay`` seconds later. ``times=0`` ends all faults.
         """
         self.ask("POST", CONTROL + "fail", json.dumps({"times": times} | fault).encode())
 
     def counted(self) -> list[dict[str, Any]]:
-        """Return the requests since the last call: method, path, status, sent (bytes)."""
+        """Return the requests since the last call.
+
+        Each has method, path, status, sent (bytes), and how many were going on at_once.
+        """
         found: list[dict[str, Any]] = json.loads(self.ask("POST", CONTROL + "log"))
         return found
 
@@ -142,15 +146,30 @@ class Counting:
     faults: list[dict[str, Any]] = field(default_factory=list)
     writing: threading.Lock = field(default_factory=threading.Lock)
     guard: threading.Lock = field(default_factory=threading.Lock)
+    active: int = 0
 
     def __call__(self, environ: dict[str, Any], start: Callable[..., Any]) -> Iterable[bytes]:
         method, path = environ["REQUEST_METHOD"], environ["PATH_INFO"]
         if path.startswith(CONTROL):
             return self._control(path.removeprefix(CONTROL), environ, start)
         fault = self._fault(method, path)
-        if fault is not None and fault["status"] != 1:
+        if fault is not None and fault["status"] not in (1, 200):
             self._note(method, path, fault["status"], 0)
             return _failed(fault, environ, start)
+        with self.guard:
+            self.active += 1
+        if fault is not None and fault["status"] == 200:
+            time.sleep(fault["delay"])
+        try:
+            return self._serve(environ, start, fault)
+        finally:
+            with self.guard:
+                self.active -= 1
+
+    def _serve(
+        self, environ: dict[str, Any], start: Callable[..., Any], fault: dict[str, Any] | None
+    ) -> Iterable[bytes]:
+        method, path = environ["REQUEST_METHOD"], environ["PATH_INFO"]
         status: list[str] = []
 
         def started(text: str, headers: list[Any], *rest: Any) -> Any:
@@ -163,7 +182,7 @@ class Counting:
         else:
             body = b"".join(self.app(environ, started))
         self._note(method, path, int(status[0].split()[0]), len(body))
-        if fault is not None:
+        if fault is not None and fault["status"] == 1:
             return _failed(fault, environ, start)
         return [body]
 
@@ -178,7 +197,8 @@ class Counting:
 
     def _note(self, method: str, path: str, status: int, sent: int) -> None:
         with self.guard:
-            self.log.append({"method": method, "path": path, "status": status, "sent": sent})
+            note = {"method": method, "path": path, "status": status, "sent": sent}
+            self.log.append(note | {"at_once": self.active})
 
     def _control(
         self, what: str, environ: dict[str, Any], start: Callable[..., Any]
