@@ -31,7 +31,7 @@ def test_hit_means_verified_damage_is_found_and_mended(store: Store) -> None:
 
 def ruin(store: Store, digest: str, damage: str) -> None:
     member = max(
-        (p for p in store.folder(digest).rglob("*") if p.is_file() and p.parent.name == "c"),
+        (p for p in store.folder(digest).rglob("*") if p.is_file() and p.name.startswith("c.")),
         key=lambda p: p.stat().st_size,
     )
     data = bytearray(member.read_bytes())
