@@ -7,13 +7,14 @@ import threading
 import time
 import uuid
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Any
 
 os.environ.setdefault("PREFECT_SERVER_ANALYTICS_ENABLED", "false")
 os.environ.setdefault("PREFECT_LOGGING_LEVEL", "CRITICAL")
 
 import httpx
-from prefect import Flow, flow
+from prefect import Flow, flow, tags
 from prefect.artifacts import create_progress_artifact, update_progress_artifact
 from prefect.task_runners import ThreadPoolTaskRunner
 
@@ -28,9 +29,23 @@ PROGRESS_EVERY_S = 2.0
 
 def scene_flow(scene: str) -> Callable[[Callable[..., Any]], Flow[..., Any]]:
     """Return the decorator that makes a function the flow run of ``scene``."""
+    return _flow("factorize-scene", scene)
+
+
+def collection_flow(collection: str) -> Callable[[Callable[..., Any]], Flow[..., Any]]:
+    """Return the decorator that makes a function the flow run of ``collection``."""
+    return _flow("factorize-collection", collection)
+
+
+def of_collection(collection: str) -> AbstractContextManager[Any]:
+    """Mark the flow runs that start inside as those of a collection."""
+    return tags(f"collection:{collection}")
+
+
+def _flow(name: str, run_name: str) -> Callable[[Callable[..., Any]], Flow[..., Any]]:
     return flow(
-        name="factorize-scene",
-        flow_run_name=scene.replace("{", "(").replace("}", ")"),
+        name=name,
+        flow_run_name=run_name.replace("{", "(").replace("}", ")"),
         task_runner=ThreadPoolTaskRunner(max_workers=MAX_TASKS),
         validate_parameters=False,
         persist_result=False,

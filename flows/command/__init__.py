@@ -65,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             "stopped; what was finished is in the store: the same command goes on from there",
             EXIT_INTERRUPTED,
         )
-    except _expected_errors() as error:
+    except expected_errors() as error:
         code = EXIT_FAILED if isinstance(error, OSError) else EXIT_WRONG_USE
         return _fail(options, str(error), code)
 
@@ -95,7 +95,8 @@ def say(text: str) -> None:
     print(redact(text), file=sys.stderr, flush=True)
 
 
-def _expected_errors() -> tuple[type[Exception], ...]:
+def expected_errors() -> tuple[type[Exception], ...]:
+    """Return the errors whose message is for the user."""
     from garden_models.scene import BadGeometry, BadInput
     from storage.errors import StoreError
     from storage.formats.errors import UnreadableInput

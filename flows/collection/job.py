@@ -1,0 +1,52 @@
+"""What a worker of a collection does for one scene: any object with ``plan`` and ``run``."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol
+
+from storage import Store
+from tasks.step import Budget, StepEvent
+
+Report = dict[str, Any]
+"""Fields of ``SceneRow`` by name; ``status`` at least."""
+
+
+@dataclass(frozen=True)
+class JobRun:
+    """What a job is run with: call it with every step's event; hand on engine and budget."""
+
+    listener: Callable[[StepEvent], None]
+    engine: Literal["prefect", "local"]
+    budget: Budget
+
+    def __call__(self, event: StepEvent) -> None:
+        """Take one event, from any thread."""
+        self.listener(event)
+
+
+class Job(Protocol):
+    """The work for one scene."""
+
+    def plan(self, store: Store) -> Report | None:
+        """Return the report if nothing has to run, from the store alone; else None."""
+
+    def run(self, store: Store, events: JobRun) -> Report:
+        """Do the work; an error makes the scene one that failed, with its words."""
+
+
+@dataclass(frozen=True)
+class JobOrder:
+    """How to make a job in any process: ``module:callable`` and its JSON arguments."""
+
+    name: str
+    job: str
+    arguments: dict[str, Any] = field(default_factory=dict)
+
+    def make(self) -> Job:
+        """Return the job."""
+        module, _, name = self.job.partition(":")
+        made: Job = getattr(importlib.import_module(module), name)(**self.arguments)
+        return made

@@ -1,0 +1,25 @@
+"""Make a collection one flow run, and have its workers report to the same Prefect server."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from prefect.settings import PREFECT_API_URL, temporary_settings
+
+from flows.collection.prefect_server import server_address
+from flows.prefect_flow import collection_flow, of_collection
+
+
+def in_collection_flow(name: str, body: Callable[[], None], environment: dict[str, str]) -> None:
+    """Run ``body`` as the flow run of a collection.
+
+    ``environment`` is that of the processes which it starts: they are told the server.
+    """
+
+    def run() -> None:
+        body()
+
+    with server_address() as address, temporary_settings({PREFECT_API_URL: address}):
+        environment["PREFECT_API_URL"] = address
+        with of_collection(name):
+            collection_flow(name)(run)()

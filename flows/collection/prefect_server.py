@@ -1,0 +1,89 @@
+"""Start a Prefect server for one batch: ``python -m`` this module with SOCKET and PARENT.
+
+Prefect's own temporary server outlives a killed batch; this one dies with it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from tasks.step.child import die_with
+
+START_S = 180.0
+
+
+@contextmanager
+def server_address() -> Iterator[str]:
+    """Give the API address of the server that is configured, else of one started here.
+
+    Raises RuntimeError if it does not start.
+    """
+    from prefect.settings import PREFECT_API_URL
+
+    configured = PREFECT_API_URL.value()
+    if configured:
+        yield str(configured)
+        return
+    listening = socket.socket()
+    with listening:
+        listening.bind(("127.0.0.1", 0))
+        listening.listen(128)
+        port = listening.getsockname()[1]
+        process = subprocess.Popen(
+            [sys.executable, "-m", __name__, str(listening.fileno()), str(os.getpid())],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            pass_fds=(listening.fileno(),),
+            start_new_session=True,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        )
+    try:
+        address = f"http://127.0.0.1:{port}/api"
+        _wait_for(address, process)
+        yield address
+    finally:
+        process.terminate()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=15)
+        process.kill()
+        process.wait()
+
+
+def _wait_for(address: str, process: subprocess.Popen[bytes]) -> None:
+    import httpx
+
+    deadline = time.monotonic() + START_S
+    while time.monotonic() < deadline and process.poll() is None:
+        with contextlib.suppress(httpx.HTTPError):
+            if httpx.get(f"{address}/health", timeout=5.0).status_code == httpx.codes.OK:
+                return
+        time.sleep(0.1)
+    raise RuntimeError(
+        f"the Prefect server did not start within {START_S:g} s: try `prefect server start`, or"
+        " --engine local"
+    )
+
+
+def main() -> None:
+    """Serve on the socket until the batch ends."""
+    descriptor, parent = int(sys.argv[1]), int(sys.argv[2])
+    die_with(parent)
+    os.environ |= {"PREFECT_UI_ENABLED": "0", "PREFECT_SERVER_ANALYTICS_ENABLED": "false"}
+    import uvicorn
+    from prefect.server.api.server import create_app
+
+    listening = socket.socket(fileno=descriptor)
+    server = uvicorn.Server(uvicorn.Config(create_app(), log_level="error", lifespan="on"))
+    server.run(sockets=[listening])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,363 @@
+"""Run a collection: what is finished is seen in the store, the rest goes to worker processes."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from flows.collection.definition import Collection
+from flows.collection.job import JobOrder
+from flows.collection.row import RunningStep, SceneRow, Status, worst_status
+from flows.collection.scene_job import scene_order
+from flows.collection.state import (
+    CollectionState,
+    end_running,
+    failed_names,
+    only_runner,
+    read_state,
+)
+from flows.collection.stopping import stop_on_terminate
+from flows.collection.worker import WorkerSetting, failure_reason
+from flows.collection.worker_process import GRACE_S, WorkerProcess
+from flows.wrong_use import WrongUse
+from storage import Store
+from storage.owner import Owner
+from tasks.step import Budget
+
+ONLY_FAILED = "failed"
+GB_A_SCENE = 2.0
+_POLL_S = 0.2
+
+Engine = Literal["prefect", "local"]
+
+
+@dataclass(frozen=True)
+class RowEvent:
+    """Something that happened to a scene; its row says what is known now."""
+
+    kind: Literal["planned", "started", "progress", "finished"]
+    row: SceneRow
+
+
+@dataclass(frozen=True)
+class CollectionResult:
+    """The rows of the scenes that were asked for, and the worst status of them."""
+
+    rows: tuple[SceneRow, ...]
+    status: Status
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a collection is run; see ``run_collection``."""
+
+    engine: Engine = "prefect"
+    scenes_at_once: int | None = None
+    only: tuple[str, ...] = ()
+    keep_going: bool = True
+    budget: Budget | None = None
+
+
+def tell_nobody(event: RowEvent) -> None:
+    """Ignore an event."""
+
+
+def run_collection(
+    collection: Collection,
+    store_address: str,
+    *,
+    engine: Engine = "prefect",
+    scenes_at_once: int | None = None,
+    only: Sequence[str] = (),
+    keep_going: bool = True,
+    budget: Budget | None = None,
+    on_event: Callable[[RowEvent], None] = tell_nobody,
+) -> CollectionResult:
+    """Run all scenes of a collection that are not finished; return what came of all.
+
+    The state is in ``OUT/collection.json`` while it runs and afterwards, the scenes that
+    failed in ``OUT/failed.json``.
+
+    Args:
+        collection: from ``read_collection``.
+        store_address: what ``Store.open`` takes.
+        engine: ``prefect`` (every scene is a flow run) or ``local``.
+        scenes_at_once: worker processes; as many as cores and memory allow if not given.
+        only: names of scenes, or ``failed`` for those of ``failed.json``.
+        keep_going: whether a scene that failed leaves the others alone.
+        budget: what all steps together may use; the machine if not given.
+        on_event: called in this thread whenever a scene's row changed.
+
+    Raises:
+        WrongUse: an unknown name, another batch in the same folder.
+        KeyboardInterrupt: stopped by Ctrl-C or SIGTERM; the state says so.
+    """
+    orders = [scene_order(request) for request in collection.scenes]
+    options = Options(engine, scenes_at_once, tuple(only), keep_going, budget)
+    return run_jobs(collection, orders, store_address, options, on_event)
+
+
+def run_jobs(
+    collection: Collection,
+    orders: Iterable[JobOrder],
+    store_address: str,
+    options: Options,
+    on_event: Callable[[RowEvent], None] = tell_nobody,
+) -> CollectionResult:
+    """Run any jobs as the scenes of a collection, whose ``scenes`` are not looked at."""
+    jobs = {order.name: order for order in orders}
+    with only_runner(collection.out), stop_on_terminate():
+        state = _fresh_state(collection, jobs, store_address)
+        chosen = _chosen(options.only, state)
+        budget = options.budget or Budget.of_machine()
+        state.scenes_at_once = options.scenes_at_once or scenes_that_fit(budget)
+        return _Runner(state, jobs, chosen, options, budget, on_event).run()
+
+
+def scenes_that_fit(budget: Budget) -> int:
+    """Return how many scenes keep a budget full: one a core, as far as memory goes."""
+    return max(1, min(len(budget.cores), int(budget.memory_gb / GB_A_SCENE)))
+
+
+def _fresh_state(
+    collection: Collection, jobs: dict[str, JobOrder], store_address: str
+) -> CollectionState:
+    """Return this batch's state, with the rows that the last one left for the same scenes."""
+    before = read_state(collection.out)
+    if before is not None and before.name != collection.name:
+        raise WrongUse(
+            f"{collection.out} holds the collection {before.name}: give another --out for"
+            f" {collection.name}"
+        )
+    unreadable = {scene.name: scene.reason for scene in collection.unreadable}
+    rows = {}
+    for name in sorted([*jobs, *unreadable]):
+        rows[name] = before.rows.get(name, SceneRow(name)) if before else SceneRow(name)
+        if name in unreadable:
+            rows[name] = SceneRow(name, "failed", [unreadable[name]])
+    return CollectionState(
+        name=collection.name,
+        source=collection.source,
+        store=store_address,
+        out=collection.out,
+        rows=rows,
+        owner=Owner.here(),
+        remarks=list(collection.remarks),
+    )
+
+
+def _chosen(only: tuple[str, ...], state: CollectionState) -> list[str]:
+    """Return the names of the scenes to look at."""
+    if not only:
+        return list(state.rows)
+    wanted: set[str] = set()
+    for name in only:
+        if name == ONLY_FAILED:
+            wanted |= set(failed_names(state.out)) & state.rows.keys()
+        elif name in state.rows:
+            wanted.add(name)
+        else:
+            raise WrongUse(f"no scene of {state.name} is called {name}: correct --only")
+    return [name for name in state.rows if name in wanted]
+
+
+class _Runner:
+    """One batch: a queue of scenes to plan, one of scenes to run, and the workers."""
+
+    def __init__(
+        self,
+        state: CollectionState,
+        jobs: dict[str, JobOrder],
+        chosen: list[str],
+        options: Options,
+        budget: Budget,
+        on_event: Callable[[RowEvent], None],
+    ) -> None:
+        self._state = state
+        self._jobs = jobs
+        self._chosen = chosen
+        self._options = options
+        self._budget = budget
+        self._on_event = on_event
+        self._store = Store.open(state.store)
+        self._unplanned = deque(name for name in chosen if name in jobs)
+        self._ready: deque[str] = deque()
+        self._workers: list[WorkerProcess] = []
+        self._environment = dict(os.environ)
+
+    def run(self) -> CollectionResult:
+        """Do everything; the state says how it ended, however it ends."""
+        for name in self._chosen:
+            if name in self._jobs:
+                self._state.rows[name].status = "waiting"
+            else:
+                self._tell("finished", self._state.rows[name])
+        self._state.save()
+        self._state.save_failed()
+        try:
+            self._plan_until_work()
+            if self._ready and not self._must_stop():
+                self._in_engine()
+            self._state.phase = "stopped" if self._must_stop() else "finished"
+        except BaseException:
+            self._state.phase = "stopped"
+            raise
+        finally:
+            self._end_workers()
+            end_running(self._state, "the batch was stopped; the same command goes on from there")
+            self._state.save()
+            self._state.save_failed()
+        rows = tuple(self._state.rows[name] for name in self._chosen)
+        return CollectionResult(rows, worst_status(rows))
+
+    def _in_engine(self) -> None:
+        if self._options.engine == "local":
+            self._work()
+            return
+        from flows.collection.prefect_collection import in_collection_flow
+
+        in_collection_flow(self._state.name, self._work, self._environment)
+
+    def _plan_until_work(self) -> None:
+        """Look for finished scenes; no server and no worker is started for these."""
+        while self._unplanned and not self._ready and not self._must_stop():
+            self._plan_next()
+
+    def _work(self) -> None:
+        while self._unplanned or self._ready or self._busy:
+            if self._must_stop():
+                return
+            if self._unplanned:
+                self._plan_next()
+            self._fill()
+            self._listen(0.0 if self._unplanned else _POLL_S)
+            self._state.save(now=False)
+
+    def _must_stop(self) -> bool:
+        if self._options.keep_going:
+            return False
+        return any(self._state.rows[name].status == "failed" for name in self._chosen)
+
+    # -- planning -------------------------------------------------------------------------
+
+    def _plan_next(self) -> None:
+        row = self._state.rows[self._unplanned.popleft()]
+        try:
+            report = self._jobs[row.name].make().plan(self._store)
+        except Exception as error:  # noqa: BLE001 - whatever it is, it is this scene's alone
+            report = {"status": "failed", "reasons": [failure_reason(error)]}
+        if report is None:
+            self._ready.append(row.name)
+            self._tell("planned", row)
+            return
+        row.take(report)
+        row.running = []
+        self._tell("finished", row)
+
+    # -- working --------------------------------------------------------------------------
+
+    @property
+    def _busy(self) -> bool:
+        return any(worker.job is not None for worker in self._workers)
+
+    def _fill(self) -> None:
+        """Give every free worker a scene; start workers as far as there are scenes."""
+        for worker in [w for w in self._workers if w.job is None]:
+            if self._ready:
+                self._start(self._ready.popleft(), worker)
+        while self._ready and len(self._workers) < self._state.scenes_at_once:
+            setting = WorkerSetting(
+                store=self._state.store,
+                engine=self._options.engine,
+                budget=self._budget.to_json(),
+                collection=self._state.name,
+                path=sys.path,
+            )
+            worker = WorkerProcess(setting, self._environment)
+            self._workers.append(worker)
+            self._start(self._ready.popleft(), worker)
+
+    def _start(self, name: str, worker: WorkerProcess) -> None:
+        worker.give(self._jobs[name])
+        self._state.rows[name] = SceneRow(name, "running", started=worker.started)
+        self._tell("started", self._state.rows[name])
+
+    def _listen(self, seconds: float) -> None:
+        by_pipe = {worker.answers: worker for worker in self._workers}
+        ready, _, _ = select.select(list(by_pipe), [], [], seconds)
+        for pipe in ready:
+            worker = by_pipe[pipe]
+            messages = worker.hear()
+            if messages is None:
+                self._bury(worker)
+                continue
+            for message in messages:
+                self._take(worker, message)
+
+    def _take(self, worker: WorkerProcess, message: dict[str, Any]) -> None:
+        row = self._state.rows[worker.job or ""]
+        if "event" in message:
+            follow(row, message["event"])
+            self._tell("progress", row)
+            return
+        worker.finish_job()
+        failed = {"status": "failed", "reasons": [message.get("failed")]}
+        self._finish(row, message.get("done", failed), worker)
+        if worker.is_worn:
+            self._workers.remove(worker)
+            worker.end(GRACE_S)
+
+    def _bury(self, worker: WorkerProcess) -> None:
+        """Take a worker out that died: the scene that it worked on has failed."""
+        self._workers.remove(worker)
+        if worker.job is not None:
+            report = {"status": "failed", "reasons": [worker.how_it_died()]}
+            self._finish(self._state.rows[worker.job], report, worker)
+        worker.end()
+
+    def _finish(self, row: SceneRow, report: dict[str, Any], worker: WorkerProcess) -> None:
+        row.take(report)
+        row.running = []
+        row.finished = time.time()
+        row.seconds = round(row.finished - worker.started, 3)
+        if row.status == "failed":
+            self._state.save_failed()
+        self._tell("finished", row)
+
+    def _end_workers(self) -> None:
+        for worker in self._workers:
+            if worker.job is not None:
+                worker.ask_to_end()
+        for worker in self._workers:
+            worker.end(GRACE_S)
+        self._workers = []
+
+    def _tell(
+        self, kind: Literal["planned", "started", "progress", "finished"], row: SceneRow
+    ) -> None:
+        self._state.save(now=False)
+        self._on_event(RowEvent(kind, row))
+
+
+def follow(row: SceneRow, event: dict[str, Any]) -> None:
+    """Take a step's event into its scene's row."""
+    step, target = event["step"], event["label"]
+    known = next((r for r in row.running if (r.step, r.target) == (step, target)), None)
+    if event["kind"] == "finished":
+        if known is not None:
+            row.running.remove(known)
+        row.executed += event["outcome"] == "executed"
+        row.cached += event["outcome"] == "cached"
+        row.peak_mb = max(row.peak_mb, event["peak_mb"])
+        return
+    if known is None:
+        known = RunningStep(step, target, event["time"])
+        row.running.append(known)
+    if event["kind"] == "progress":
+        known.share, known.doing = round(event["share"] or 0.0, 3), event["doing"]
