@@ -9,10 +9,12 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 from flows.collection.definition import Collection
 from flows.collection.job import JobOrder
+from flows.collection.page import write_page
 from flows.collection.row import RunningStep, SceneRow, Status, worst_status
 from flows.collection.scene_job import scene_order
 from flows.collection.state import (
@@ -114,7 +116,7 @@ def run_jobs(
     jobs = {order.name: order for order in orders}
     with only_runner(collection.out), stop_on_terminate():
         state = _fresh_state(collection, jobs, store_address)
-        chosen = _chosen(options.only, state)
+        chosen = chosen_names(options.only, state.name, state.rows, state.out)
         budget = options.budget or Budget.of_machine()
         state.scenes_at_once = options.scenes_at_once or scenes_that_fit(budget)
         return _Runner(state, jobs, chosen, options, budget, on_event).run()
@@ -152,19 +154,23 @@ def _fresh_state(
     )
 
 
-def _chosen(only: tuple[str, ...], state: CollectionState) -> list[str]:
-    """Return the names of the scenes to look at."""
-    if not only:
-        return list(state.rows)
-    wanted: set[str] = set()
+def chosen_names(
+    only: tuple[str, ...], collection: str, names: Iterable[str], out: Path
+) -> list[str]:
+    """Return which of a collection's scenes ``--only`` means, all if it is empty.
+
+    Raises WrongUse for a name that is none of them.
+    """
+    known = list(names)
+    wanted: set[str] = set() if only else set(known)
     for name in only:
         if name == ONLY_FAILED:
-            wanted |= set(failed_names(state.out)) & state.rows.keys()
-        elif name in state.rows:
+            wanted |= set(failed_names(out))
+        elif name in known:
             wanted.add(name)
         else:
-            raise WrongUse(f"no scene of {state.name} is called {name}: correct --only")
-    return [name for name in state.rows if name in wanted]
+            raise WrongUse(f"no scene of {collection} is called {name}: correct --only")
+    return [name for name in known if name in wanted]
 
 
 class _Runner:
@@ -211,10 +217,14 @@ class _Runner:
         finally:
             self._end_workers()
             end_running(self._state, "the batch was stopped; the same command goes on from there")
-            self._state.save()
-            self._state.save_failed()
+            self._save_all()
         rows = tuple(self._state.rows[name] for name in self._chosen)
         return CollectionResult(rows, worst_status(rows))
+
+    def _save_all(self) -> None:
+        self._state.save()
+        self._state.save_failed()
+        write_page(self._state)
 
     def _in_engine(self) -> None:
         if self._options.engine == "local":

@@ -56,7 +56,7 @@ class CollectionState:
         if not now and time.monotonic() - self._written < _EVERY_S:
             return
         self._written, self.updated = time.monotonic(), time.time()
-        _write(self.out / STATE, self.to_json())
+        write_beside(self.out / STATE, _dump(self.to_json()))
 
     def save_failed(self) -> None:
         """Write ``failed.json``: the scenes that failed, and why."""
@@ -67,7 +67,7 @@ class CollectionState:
             "source": self.source,
             "scenes": [{"name": row.name, "reasons": row.reasons} for row in failed],
         }
-        _write(self.out / FAILED, document)
+        write_beside(self.out / FAILED, _dump(document))
 
     def to_json(self) -> dict[str, Any]:
         """Return the file's document."""
@@ -165,10 +165,11 @@ def only_runner(out: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
-def _write(path: Path, document: dict[str, Any]) -> None:
+def write_beside(path: Path, text: str) -> None:
+    """Replace a file in one step; PackageError if it cannot be written."""
     partial = path.with_name(f".{path.name}.partial")
     try:
-        partial.write_text(json.dumps(document, indent=1) + "\n")
+        partial.write_text(text, "utf-8")
         partial.replace(path)
     except OSError as error:
         with contextlib.suppress(OSError):
@@ -176,3 +177,7 @@ def _write(path: Path, document: dict[str, Any]) -> None:
         raise PackageError(
             f"{path} could not be written ({error.strerror}): free some space or give another --out"
         ) from error
+
+
+def _dump(document: dict[str, Any]) -> str:
+    return json.dumps(document, indent=1) + "\n"

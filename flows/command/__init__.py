@@ -15,6 +15,8 @@ EXIT_OF_STATUS = {"ok": EXIT_OK, "degraded": EXIT_DEGRADED, "failed": EXIT_FAILE
 
 COMMANDS = {
     "factorize": "turn a capture into a settled, simulation-ready scene",
+    "batch": "run a collection of scenes; what is finished is not run again",
+    "status": "tell how a collection stands, also while it runs in another terminal",
     "plan": "tell what factorize would run and why, without running it",
     "why": "tell from which steps and inputs an artifact came",
     "store": "list or verify what the artifact store holds",
@@ -31,6 +33,8 @@ examples:
   garden factorize photos/desk --box mug IMG_0012.jpg 480 300 760 690
   garden factorize photos/desk --targets boxes.json --out scenes
   garden plan photos/desk          what would run, and why
+  garden batch night.toml          a collection of scenes, or a folder of captures
+  garden status scenes             how it stands, from another terminal
   garden why reconstruct           where the newest reconstruction came from
 
 exit codes: 0 ok, 1 failed, 2 wrong use, 3 degraded (a result, but weaker than asked)"""

@@ -80,6 +80,11 @@ def open_store(options: argparse.Namespace, create: bool = True) -> Store:
     return Store.open(store_path(options.store), create=create)
 
 
+def store_address(given: str | None) -> str:
+    """Return what ``Store.open`` takes, in any process of this machine."""
+    return str(store_path(given).expanduser().absolute())
+
+
 def store_path(given: str | None) -> Path:
     """Return the store's folder."""
     if given or os.environ.get("GARDEN_STORE"):
