@@ -11,7 +11,11 @@ from garden_models.scene import GravityView, Reconstruction
 from tasks.step import step
 
 
-@step(version=1, packages=("numpy", "opencv-python-headless", "scipy"))
+@step(
+    version=1,
+    packages=("numpy", "opencv-python-headless", "scipy"),
+    modules=("garden_models.gravity",),  # methods are imported by their names
+)
 def align_gravity(
     reconstruction: Reconstruction, config: AlignGravity, progress: Progress = silent
 ) -> GravityView:

@@ -14,7 +14,7 @@ from garden_models.scene import (
 from tasks.step import step
 
 
-@step(version=1, packages=("numpy", "scipy", "opencv-python-headless"))
+@step(version=1, packages=("numpy", "scipy", "opencv-python-headless", "trimesh"))
 def clean_background(
     reconstruction: Reconstruction,
     gravity_view: GravityView,

@@ -23,7 +23,7 @@ from tasks.step import step
 
 @step(
     version=1,
-    packages=("numpy", "scipy", "coacd", "trimesh", "mujoco"),
+    packages=("numpy", "scipy", "coacd", "trimesh", "mujoco", "opencv-python-headless"),
     isolated=True,
     time_limit_s=1800,
     memory_limit_gb=4,

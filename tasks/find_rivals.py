@@ -11,7 +11,7 @@ from garden_models.segmentation.config import Segment
 from tasks.step import step
 
 
-@step(version=1, packages=("numpy", "scipy"))
+@step(version=1, packages=("numpy", "scipy", "opencv-python-headless"))
 def find_rivals(
     reconstruction: Reconstruction,
     gravity_view: GravityView,

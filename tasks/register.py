@@ -14,7 +14,7 @@ from tasks.step import step, step_scratch
 
 @step(
     version=1,
-    packages=("pycolmap", "numpy"),
+    packages=("pycolmap", "numpy", "scipy", "torch", "opencv-python-headless"),
     isolated=True,
     time_limit_s=3600,
     memory_limit_gb=6,

@@ -11,7 +11,11 @@ from garden_models.scene import SimScene, Trajectory
 from tasks.step import step
 
 
-@step(version=1, packages=("mujoco", "numpy"), memory_gb=0.5)
+@step(
+    version=1,
+    packages=("mujoco", "numpy", "scipy", "trimesh", "opencv-python-headless"),
+    memory_gb=0.5,
+)
 def simulate(scene: SimScene, config: Simulation, progress: Progress = silent) -> Trajectory:
     """Return the bodies' poses over time and how they moved."""
     from garden_models.physics.simulate import simulate as run
