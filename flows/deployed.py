@@ -8,7 +8,7 @@ from typing import Any
 
 from prefect import flow
 
-from flows.command.scene_options import add_scene_options, scene_request, store_path
+from flows.command.scene_options import add_scene_options, scene_request, store_address
 from flows.package.write import refresh_report, write_scene_package
 from flows.scene_run import is_finished, plan_scene, run_scene
 from storage import Store
@@ -29,7 +29,7 @@ def factorize_capture(
     parser = argparse.ArgumentParser()
     add_scene_options(parser)
     request = scene_request(parser.parse_args([capture, "--out", out, *arguments]))
-    artifacts = Store.open(store_path(store))
+    artifacts = Store.open(store_address(store))
     planned, plan = plan_scene(request, artifacts)
     if is_finished(plan, planned):
         report = refresh_report(planned)

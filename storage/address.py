@@ -7,6 +7,7 @@ from pathlib import Path
 
 from storage.errors import StoreFormatError
 from storage.folder import FolderMedium
+from storage.leases import LEASE_S
 from storage.medium import Medium
 
 
@@ -15,7 +16,9 @@ def is_remote(address: str | os.PathLike[str]) -> bool:
     return "://" in str(address)
 
 
-def find_medium(address: str | os.PathLike[str], *, durable: bool, lease_s: float) -> Medium:
+def find_medium(
+    address: str | os.PathLike[str], *, durable: bool = True, lease_s: float = LEASE_S
+) -> Medium:
     """Return what is at ``address``: a bucket for ``s3://BUCKET/PREFIX``, else a folder.
 
     Raises:

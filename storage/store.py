@@ -34,7 +34,7 @@ from storage.search import matches
 FORMAT = 1
 HASH = "blake3-256"
 _KNOWN = {"format": FORMAT, "hash": HASH}
-_MARKER = "store.json"
+MARKER = "store.json"
 
 T = TypeVar("T")
 
@@ -82,7 +82,7 @@ class Store:
                 )
             with store._explained():
                 medium.prepare()
-                medium.create(_MARKER, json.dumps(_KNOWN, sort_keys=True).encode())
+                medium.create(MARKER, json.dumps(_KNOWN, sort_keys=True).encode())
             marker = store._marker()
         store._check_format(marker)
         return store
@@ -114,17 +114,17 @@ class Store:
 
     def _marker(self) -> bytes | None:
         try:
-            return self.medium.read(_MARKER)
+            return self.medium.read(MARKER)
         except (ConnectionError, TimeoutError):
             raise
         except OSError as error:
-            raise StoreFormatError(f"{self.address}/{_MARKER} cannot be read: {error}") from error
+            raise StoreFormatError(f"{self.address}/{MARKER} cannot be read: {error}") from error
 
     def _check_format(self, marker: bytes | None) -> None:
         try:
             document = json.loads(marker or b"")
         except ValueError as error:
-            raise StoreFormatError(f"{self.address}/{_MARKER} cannot be read: {error}") from error
+            raise StoreFormatError(f"{self.address}/{MARKER} cannot be read: {error}") from error
         if document != _KNOWN:
             raise StoreFormatError(
                 f"the store {self.address} is of format {document}, this version knows only"

@@ -70,15 +70,16 @@ def main(argv: Sequence[str] | None = None) -> int:
             EXIT_INTERRUPTED,
         )
     except expected_errors() as error:
-        code = EXIT_FAILED if isinstance(error, OSError) else EXIT_WRONG_USE
-        return _fail(options, str(error), code)
+        if isinstance(error, OSError):
+            return _fail(options, _sentence(error), EXIT_FAILED)
+        return _fail(options, str(error), EXIT_WRONG_USE)
 
 
 def add_shared_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that every subcommand takes."""
     parser.add_argument(
         "--store",
-        metavar="FOLDER",
+        metavar="FOLDER|s3://BUCKET/PREFIX",
         help="artifact store (default: $GARDEN_STORE, else garden/store in the user's cache)",
     )
     parser.add_argument(
@@ -106,7 +107,14 @@ def expected_errors() -> tuple[type[Exception], ...]:
     from storage.formats.errors import UnreadableInput
     from storage.formats.package import PackageError
 
-    return WrongUse, BadInput, BadGeometry, UnreadableInput, StoreError, PackageError
+    unreachable = ConnectionError, TimeoutError
+    return WrongUse, BadInput, BadGeometry, UnreadableInput, StoreError, PackageError, *unreachable
+
+
+def _sentence(error: OSError) -> str:
+    """Return what went wrong with which file, without the number of the error."""
+    where = f"{error.filename}: " if error.filename else ""
+    return where + (error.strerror or str(error))
 
 
 def _fail(options: argparse.Namespace, message: str, code: int) -> int:

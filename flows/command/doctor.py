@@ -10,7 +10,10 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from flows.command import EXIT_FAILED, EXIT_OK, print_json
-from flows.command.scene_options import store_path
+from flows.command.scene_options import store_address
+from storage import StoreError
+from storage.address import find_medium, is_remote
+from storage.store import MARKER
 
 PACKAGES = (
     "torch", "prefect", "fastapi", "zarr", "pyarrow", "pycolmap", "mujoco", "trimesh",
@@ -26,7 +29,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit code."""
-    findings = [*_packages(), _cores(), _memory(), _disk(options), _gpu()]
+    findings = [*_packages(), _cores(), _memory(), _store(options), _gpu()]
     broken = [f for f in findings if f["state"] == "missing"]
     if options.json:
         print_json({"status": "failed" if broken else "ok", "findings": findings})
@@ -61,8 +64,23 @@ def _memory() -> dict[str, str]:
     return _finding("memory", "ok" if enough else "low", note)
 
 
-def _disk(options: argparse.Namespace) -> dict[str, str]:
-    folder = store_path(options.store)
+def _store(options: argparse.Namespace) -> dict[str, str]:
+    address = store_address(options.store)
+    return _bucket(address) if is_remote(address) else _disk(Path(address).expanduser().absolute())
+
+
+def _bucket(address: str) -> dict[str, str]:
+    try:
+        medium = find_medium(address)
+        if medium.read(MARKER) is None:
+            medium.prepare()
+            return _finding("store", "ok", f"{address}, empty so far")
+    except (StoreError, OSError) as error:
+        return _finding("store", "missing", getattr(error, "strerror", None) or str(error))
+    return _finding("store", "ok", address)
+
+
+def _disk(folder: Path) -> dict[str, str]:
     existing: Path = next(p for p in (folder, *folder.parents) if p.exists())
     free = shutil.disk_usage(existing).free / 1e9
     enough = free >= NEEDED_GB_DISK

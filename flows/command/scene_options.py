@@ -15,6 +15,7 @@ from flows.wrong_use import WrongUse
 from garden_models.scene import Target
 from garden_models.targets.boxes import parse_boxes
 from storage import Store
+from storage.address import is_remote
 
 SCENES = "scenes"
 
@@ -77,19 +78,13 @@ def scene_request(options: argparse.Namespace) -> SceneRequest:
 
 def open_store(options: argparse.Namespace, create: bool = True) -> Store:
     """Open the store that ``--store``, ``$GARDEN_STORE`` or the cache folder names."""
-    return Store.open(store_path(options.store), create=create)
+    return Store.open(store_address(options.store), create=create)
 
 
 def store_address(given: str | None) -> str:
     """Return what ``Store.open`` takes, in any process of this machine."""
-    return str(store_path(given).expanduser().absolute())
-
-
-def store_path(given: str | None) -> Path:
-    """Return the store's folder."""
-    if given or os.environ.get("GARDEN_STORE"):
-        return Path(given or os.environ["GARDEN_STORE"])
-    return cache_folder() / "store"
+    address = given or os.environ.get("GARDEN_STORE") or str(cache_folder() / "store")
+    return address if is_remote(address) else str(Path(address).expanduser().absolute())
 
 
 def _targets(options: argparse.Namespace) -> Path | tuple[Target, ...] | None:

@@ -38,6 +38,15 @@ _POLL_S = 0.1
 _WEIGH_EVERY_S = 0.3
 _TAIL_CHARACTERS = 2000
 _READ_BYTES = 1 << 16
+_STORE_ERRORS = {
+    "MissingArtifact",
+    "SchemaMismatch",
+    "StoreDenied",
+    "StoreFull",
+    "StoreMissing",
+    "StoreReadOnly",
+    "Unstorable",
+}
 
 
 def compute_isolated(
@@ -218,7 +227,7 @@ def _rebuild(error: dict[str, Any]) -> Exception:
         return cls(message)
     if kind == "CorruptArtifact":
         return CorruptArtifact(error["object"], error["reason"])
-    if kind in ("StoreFull", "StoreReadOnly", "Unstorable", "SchemaMismatch", "MissingArtifact"):
+    if kind in _STORE_ERRORS:
         store_error: type[Exception] = getattr(errors, kind)
         return store_error(message)
     if kind == "MemoryError":

@@ -15,7 +15,8 @@ import pytest
 
 from storage import Store
 from tasks.step import RunContext, StepEvent, StepFailed, load, run_context
-from tests.tasks.step.toy import Numbers, Scaling, apart, dawdle, hoard, make
+from tests.s3_server import BUCKET, S3Server
+from tests.tasks.step.toy import Numbers, Scaling, apart, dawdle, hoard, in_run, make
 
 
 def alive(pid: int) -> bool:
@@ -179,3 +180,12 @@ def test_single_flight_between_processes_and_take_over(store: Store, tmp_path: P
         assert store.action(refs[0].key).seconds["wait"] > 0.3
     finally:
         owner.kill()
+
+
+def test_a_child_works_in_a_store_in_a_bucket(s3: S3Server) -> None:
+    store = Store.open(f"s3://{BUCKET}/isolated")
+    ref, _run = in_run(store, lambda: apart(make(3), Scaling()))
+    assert store.read(ref.object, Numbers).values.tolist() == [1.0, 2.0, 3.0]
+    assert in_run(store, lambda: apart(make(3), Scaling()))[0].outcome == "cached"
+    with pytest.raises(StepFailed, match="a sentence"):
+        in_run(store, lambda: apart(make(3), Scaling(note="bad")))
