@@ -23,17 +23,21 @@ from storage.errors import (
     StoreReadOnly,
     Unstorable,
 )
+from storage.keep import Keep
 from storage.manifest import Manifest
 from storage.objects import Published
+from storage.pins import Pin
 from storage.source import SourceFile
 from storage.store import Store
 
 __all__ = [
     "ActionRecord",
     "CorruptArtifact",
+    "Keep",
     "Manifest",
     "MissingArtifact",
     "Output",
+    "Pin",
     "Problem",
     "Published",
     "SchemaMismatch",

@@ -47,6 +47,10 @@ class FileSystem:
         """Give the file ``source`` a second name; FileExistsError if it is taken."""
         os.link(source, target)
 
+    def touch(self, path: Path) -> None:
+        """Make a file as young as a new one; FileNotFoundError if there is none."""
+        os.utime(path)
+
     def unlink(self, path: Path) -> None:
         """Remove a file."""
         path.unlink()

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from storage.digest import digest_bytes, digest_value, hexadecimal
+from storage.digest import digest_bytes, digest_value, hexadecimal, is_digest
 
 if TYPE_CHECKING:
     from storage.medium import Medium
@@ -83,6 +83,17 @@ def action_name(key: str) -> str:
     return f"actions/{name[:2]}/{name[2:]}.json"
 
 
+def named_key(name: str) -> str:
+    """Return the key that the name of an action's document stands for; maybe no digest."""
+    return "b3:" + name.removeprefix("actions/").removesuffix(".json").replace("/", "")
+
+
+def is_action_name(name: str) -> bool:
+    """Tell whether a document is where the record of some key would be."""
+    key = named_key(name)
+    return is_digest(key) and action_name(key) == name
+
+
 def read_action(medium: Medium, key: str) -> ActionRecord | None:
     """Return the record of a key; None if there is none, or none that can be read."""
     data = medium.read(action_name(key))
@@ -117,11 +128,6 @@ def _keep_conflict(medium: Medium, record: ActionRecord) -> None:
     name = hexadecimal(record.key)
     outcome = hexadecimal(digest_bytes(record.to_bytes()))[:16]
     medium.create(f"conflicts/{name[:2]}/{name[2:]}-{outcome}.json", record.to_bytes())
-
-
-def delete_action(medium: Medium, key: str) -> None:
-    """Forget an action; its object is not touched."""
-    medium.delete(action_name(key))
 
 
 def all_actions(medium: Medium) -> Iterator[ActionRecord]:
@@ -164,7 +170,49 @@ def latest_of_scene(medium: Medium, scene: str) -> Iterator[tuple[str, str, str]
             yield pointer["step"], pointer["label"], pointer["key"]
 
 
-def _pointer(medium: Medium, name: str) -> dict[str, str]:
+def pointed_action(medium: Medium, pointer: str) -> str | None:
+    """Return the name of the action's document to which a pointer in ``latest/`` points."""
+    key = _pointer(medium, pointer).get("key")
+    return action_name(key) if isinstance(key, str) and is_digest(key) else None
+
+
+def latest_record(medium: Medium, scene: str, step: str, label: str) -> ActionRecord | None:
+    """Return the newest action of a scene's step, also if it has been forgotten since."""
+    pointer = _pointer(medium, latest_name(scene, step, label))
+    return _pointed_record(medium, pointer)
+
+
+def remembered(medium: Medium, scene: str) -> Iterator[ActionRecord]:
+    """Give the actions of a scene's steps that have been forgotten but are still explained."""
+    for name in medium.names(_latest_shelf(scene)):
+        pointer = _pointer(medium, name)
+        record = _pointed_record(medium, pointer)
+        if record is not None and "record" in pointer and read_action(medium, record.key) is None:
+            yield record
+
+
+def keep_for_explanations(medium: Medium, record: ActionRecord) -> None:
+    """Put a record that is about to be forgotten where a later run can say what changed."""
+    name = latest_name(record.scene, record.step, record.label)
+    pointer = _pointer(medium, name)
+    if pointer.get("key") == record.key and "record" not in pointer:
+        document = {**pointer, "record": json.loads(record.to_bytes())}
+        medium.replace(name, json.dumps(document, sort_keys=True).encode())
+
+
+def _pointed_record(medium: Medium, pointer: dict[str, Any]) -> ActionRecord | None:
+    if "key" not in pointer:
+        return None
+    try:
+        record = read_action(medium, pointer["key"])
+        if record is None and "record" in pointer:
+            return ActionRecord.from_bytes(json.dumps(pointer["record"]).encode())
+    except (ValueError, KeyError, TypeError):
+        return None
+    return record
+
+
+def _pointer(medium: Medium, name: str) -> dict[str, Any]:
     try:
         document = json.loads(medium.read(name) or b"{}")
     except (OSError, ValueError):

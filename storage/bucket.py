@@ -11,7 +11,7 @@ import errno
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import groupby
 from pathlib import Path
 
@@ -46,6 +46,7 @@ class BucketMedium:
         self.address = str(address)
         self._bucket = BucketClient(address)
         self.leases = BucketLeases(self._bucket, lease_s)
+        self._touched: dict[str, float] = {}
 
     def prepare(self) -> None:
         """Check that there is a bucket, and nothing but a store in the place.
@@ -76,14 +77,42 @@ class BucketMedium:
         """Make or change a document at once."""
         self._bucket.put(name, data)
 
-    def delete(self, name: str) -> None:
-        """Remove a document."""
-        self._bucket.delete([name])
+    def delete(self, *names: str) -> None:
+        """Remove documents."""
+        self._bucket.delete(list(names))
+
+    def clear(self, prefix: str) -> None:
+        """Remove all documents below a folder."""
+        self._bucket.delete(list(self.names(prefix)))
+
+    def touch(self, name: str) -> None:
+        """Make an empty document, or make it young again if it is older than an hour.
+
+        At most one request an hour and name in a process that finds it young.
+        """
+        now = time.time()
+        if now - self._touched.get(name, 0.0) < _REFRESH_AFTER_S:
+            return
+        self._touched[name] = now
+        try:
+            if now - self._bucket.head(name).modified < _REFRESH_AFTER_S:
+                return
+        except FileNotFoundError:
+            pass
+        except OSError:
+            return
+        with suppress(OSError):
+            self._bucket.put(name, b"")
 
     def names(self, prefix: str) -> Iterator[str]:
         """Give the name of every document below a folder, sorted."""
         for entry in self._bucket.list(prefix):
             yield entry.name
+
+    def times(self, prefix: str) -> Iterator[tuple[str, float]]:
+        """Give what ``names`` gives, and when each was last written, by the server's clock."""
+        for entry in self._bucket.list(prefix):
+            yield entry.name, entry.modified
 
     # -- objects --------------------------------------------------------------------------
 
@@ -169,13 +198,14 @@ class BucketMedium:
         self._bucket.delete([place + MANIFEST])
         return True
 
-    def remove(self, digest: str) -> None:
-        """Remove an object: its manifest first."""
-        place = object_prefix(digest)
-        self._bucket.delete([place + MANIFEST])
-        rest = [entry.name for entry in self._bucket.list(place)]
-        if place + MANIFEST not in rest:
-            self._bucket.delete(rest)
+    def remove(self, *digests: str) -> None:
+        """Remove objects: their manifests first."""
+        places = [object_prefix(digest) for digest in digests]
+        self._bucket.delete([place + MANIFEST for place in places])
+        for place in places:
+            rest = [entry.name for entry in self._bucket.list(place)]
+            if place + MANIFEST not in rest:
+                self._bucket.delete(rest)
 
     # -- room and order -------------------------------------------------------------------
 

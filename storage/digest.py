@@ -33,6 +33,11 @@ def digest_value(value: object, *, domain: str, nan: NanPolicy = "reject") -> st
     return digest_bytes(canonical(value, domain=domain, nan=nan))
 
 
+def is_digest(text: str) -> bool:
+    """Tell whether ``text`` is ``b3:`` and 64 hexadecimal digits."""
+    return _PATTERN.fullmatch(text) is not None
+
+
 def hexadecimal(digest: str) -> str:
     """Return the 64 digits of a digest; ValueError if it is none (paths are made of it)."""
     if not _PATTERN.fullmatch(digest):

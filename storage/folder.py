@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
+import re
 import time
 import uuid
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 
-from storage import _os, staging
+from storage import _os, locks, staging
 from storage.digest import digest_file, hexadecimal
 from storage.errors import StoreError, StoreFormatError, explain_os_error
 from storage.folder_leases import FolderLeases
@@ -19,6 +19,9 @@ from storage.leases import LEASE_S
 from storage.manifest import MANIFEST
 from storage.medium import Level
 from storage.members import MemberWriter
+
+_YOUNG_S = 3600.0
+_LISTED = re.compile(r"[^/]{2}(?!\.\.?$)[^/\0]+")
 
 
 class FolderMedium:
@@ -77,17 +80,44 @@ class FolderMedium:
             _os.ensure_folder(target.parent, durable=False)
             _os.active.rename(draft, target)
 
-    def delete(self, name: str) -> None:
-        """Remove a document."""
-        try:
-            _os.active.unlink(self.path / name)
-        except FileNotFoundError:
-            return
+    def delete(self, *names: str) -> None:
+        """Remove documents; each folder is synchronised once."""
+        folders = set()
+        for name in names:
+            place = self.path / name
+            with suppress(FileNotFoundError):
+                _os.active.unlink(place)
+                folders.add(place.parent)
+        self._sync(folders)
+
+    def clear(self, prefix: str) -> None:
+        """Remove a folder and all below it."""
+        _os.remove_tree(self.path / prefix)
+
+    def touch(self, name: str) -> None:
+        """Make an empty document, or make it young again."""
+        place = f"{self.path}/{name}"
+        with suppress(OSError):
+            try:
+                written = os.stat(place).st_mtime  # noqa: PTH116 (every hit pays for this)
+            except FileNotFoundError:
+                _os.ensure_folder(Path(place).parent, durable=False)
+                _os.active.write(Path(place), b"")
+                return
+            if time.time() - written > _YOUNG_S:
+                _os.active.touch(Path(place))
 
     def names(self, prefix: str) -> Iterator[str]:
         """Give the name of every document below a folder, sorted."""
         for name in sorted(file_sizes(self.path / prefix)):
             yield f"{prefix}{name}"
+
+    def times(self, prefix: str) -> Iterator[tuple[str, float]]:
+        """Give the name of every document below a folder, and when it was last written."""
+        found = files_below(self.path / prefix)
+        for name, entry in sorted(found.items()):
+            with suppress(FileNotFoundError):
+                yield f"{prefix}{name}", entry.stat(follow_symlinks=False).st_mtime
 
     # -- objects --------------------------------------------------------------------------
 
@@ -124,7 +154,10 @@ class FolderMedium:
         return True
 
     def refresh(self, digest: str, manifest: bytes) -> None:
-        """Do nothing: a collector is held off by ``publishing``, not by age."""
+        """Make an object young again if it is older than an hour and not another user's."""
+        with suppress(PermissionError):
+            if time.time() - self.published_at(digest) > _YOUNG_S:
+                _os.active.touch(self.folder(digest) / MANIFEST)
 
     def objects(self) -> Iterator[str]:
         """Give the digest of every object folder, sorted."""
@@ -162,37 +195,42 @@ class FolderMedium:
 
     def quarantine(self, digest: str) -> bool:
         """Move a damaged object out of the way for autopsy."""
-        ward = self.path / "quarantine"
+        name = digest.removeprefix("b3:")
+        if not _LISTED.fullmatch(name):  # whatever ``objects`` gives, also if it is no digest
+            hexadecimal(digest)
+        folder = self.path / "objects" / "b3" / name[:2] / name[2:]
+        return self._move_away([folder], "quarantine", f"{name}-{time.time_ns()}") > 0
+
+    def remove(self, *digests: str) -> None:
+        """Take the objects' names by a rename each; ``sweep`` removes their files."""
+        self._move_away([self.folder(digest) for digest in digests], "trash", uuid.uuid4().hex)
+
+    def _move_away(self, folders: list[Path], where: str, name: str) -> int:
+        """Move folders below ``where``; each shelf that loses one is synchronised once."""
+        ward = self.path / where
         _os.ensure_folder(ward, durable=True)
-        return self._move_away(digest, ward / f"{hexadecimal(digest)}-{time.time_ns()}")
+        shelves = []
+        for number, folder in enumerate(folders):
+            with suppress(FileNotFoundError):
+                _os.active.rename(folder, ward / (f"{name}-{number}" if number else name))
+                shelves.append(folder.parent)
+        self._sync(set(shelves))
+        return len(shelves)
 
-    def remove(self, digest: str) -> None:
-        """Remove an object: one rename takes its name, then its files go."""
-        _os.ensure_folder(self.path / "trash", durable=False)
-        place = self.path / "trash" / uuid.uuid4().hex
-        if self._move_away(digest, place):
-            _os.remove_tree(place)
-
-    def _move_away(self, digest: str, place: Path) -> bool:
-        try:
-            _os.active.rename(self.folder(digest), place)
-        except FileNotFoundError:
-            return False
-        return True
+    def _sync(self, folders: Iterable[Path]) -> None:
+        if self.durable:
+            for folder in sorted(folders):
+                _os.active.fsync(folder)
 
     # -- room and order -------------------------------------------------------------------
 
-    @contextmanager
-    def publishing(self) -> Iterator[None]:
+    def publishing(self) -> AbstractContextManager[None]:
         """Hold off the collector while names are made."""
-        with self._locked(fcntl.LOCK_SH):
-            yield
+        return locks.shared(self.path / "gc.lock")
 
-    @contextmanager
-    def collecting(self) -> Iterator[None]:
+    def collecting(self) -> AbstractContextManager[None]:
         """Be alone: nobody is publishing meanwhile."""
-        with self._locked(fcntl.LOCK_EX):
-            yield
+        return locks.alone(self.path / "gc.lock")
 
     @contextmanager
     def scratch(self) -> Iterator[Path]:
@@ -221,29 +259,28 @@ class FolderMedium:
         with staging.staging_folder(self.path, durable=False) as folder:
             yield folder
 
-    @contextmanager
-    def _locked(self, how: int) -> Iterator[None]:
-        flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC
-        descriptor = os.open(self.path / "gc.lock", flags, 0o644)
-        try:
-            fcntl.flock(descriptor, how)
-            yield
-        finally:
-            os.close(descriptor)
 
-
-def file_sizes(folder: Path, prefix: str = "") -> dict[str, int]:
-    """Return the bytes of every file below a folder by its relative name."""
-    sizes: dict[str, int] = {}
+def files_below(folder: Path, prefix: str = "") -> dict[str, os.DirEntry[str]]:
+    """Return every file below a folder by its relative name."""
+    found: dict[str, os.DirEntry[str]] = {}
     try:
         entries = list(os.scandir(folder))
     except (FileNotFoundError, NotADirectoryError):
-        return sizes
+        return found
     for entry in entries:
         if entry.is_dir(follow_symlinks=False):
-            sizes |= file_sizes(Path(entry.path), f"{prefix}{entry.name}/")
+            found |= files_below(Path(entry.path), f"{prefix}{entry.name}/")
         else:
-            sizes[prefix + entry.name] = entry.stat(follow_symlinks=False).st_size
+            found[prefix + entry.name] = entry
+    return found
+
+
+def file_sizes(folder: Path) -> dict[str, int]:
+    """Return the bytes of every file below a folder by its relative name."""
+    sizes: dict[str, int] = {}
+    for name, entry in files_below(folder).items():
+        with suppress(FileNotFoundError):
+            sizes[name] = entry.stat(follow_symlinks=False).st_size
     return sizes
 
 

@@ -6,14 +6,11 @@ system drops with its owner.
 
 from __future__ import annotations
 
-import fcntl
-import os
 import uuid
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 
-from storage import _os
+from storage import _os, locks
 from storage.leases import LEASE_S, Accepts, Lease, LeaseTable, lease_name
 
 
@@ -43,8 +40,9 @@ class FolderLeases(LeaseTable):
                 return False
             if new is not None:
                 _os.active.rename(self._draft(new), place)
-            elif current is not None:
-                _os.active.unlink(place)
+            else:
+                with suppress(FileNotFoundError):
+                    _os.active.unlink(place)
             return True
 
     def _read(self, key: str) -> Lease | None:
@@ -60,13 +58,7 @@ class FolderLeases(LeaseTable):
         _os.active.write(draft, lease.to_bytes())
         return draft
 
-    @contextmanager
-    def _locked(self) -> Iterator[None]:
+    def _locked(self) -> AbstractContextManager[None]:
         folder = self._store / "leases"
         _os.ensure_folder(folder, durable=False)
-        descriptor = os.open(folder / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
-            yield
-        finally:
-            os.close(descriptor)
+        return locks.alone(folder / "lock")

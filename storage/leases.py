@@ -15,7 +15,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from storage.digest import hexadecimal
+from storage.digest import hexadecimal, is_digest
 from storage.owner import Owner
 
 LEASE_S = 60.0
@@ -102,6 +102,10 @@ class LeaseTable(ABC):
         lease = self._read(key)
         return None if lease is None or lease.is_void() else lease
 
+    def drop_void(self, key: str) -> bool:
+        """Remove the lease for ``key`` if it is void or unreadable; tell whether it is gone."""
+        return self._exchange(key, _is_free, None)
+
     def _start_renewer(self) -> None:
         if self._renewer is None or not self._renewer.is_alive():
             self._renewer = threading.Thread(target=self._renew, name="leases", daemon=True)
@@ -126,6 +130,12 @@ class LeaseTable(ABC):
 def lease_name(key: str) -> str:
     """Return the name of the document that holds the lease for ``key``."""
     return f"leases/{hexadecimal(key)}.json"
+
+
+def leased_key(name: str) -> str | None:
+    """Return the key of a lease's document, None if the document is none."""
+    digits = name.removeprefix("leases/").removesuffix(".json")
+    return f"b3:{digits}" if is_digest(f"b3:{digits}") else None
 
 
 def _is_free(current: Lease | None) -> bool:

@@ -55,11 +55,23 @@ class Medium(Protocol):
     def replace(self, name: str, data: bytes) -> None:
         """Make or change a document at once. Only for what may change or is derived."""
 
-    def delete(self, name: str) -> None:
-        """Remove a document; nothing happens if there is none."""
+    def delete(self, *names: str) -> None:
+        """Remove documents, for good when it returns; nothing happens where there is none."""
+
+    def clear(self, prefix: str) -> None:
+        """Remove a folder like ``quarantine/X/`` and all documents below it."""
+
+    def touch(self, name: str) -> None:
+        """Make an empty document, or make it young again if it is older than an hour.
+
+        Cheap when it is not. Nothing happens where nothing can be written.
+        """
 
     def names(self, prefix: str) -> Iterator[str]:
         """Give the name of every document below a folder like ``actions/``, sorted."""
+
+    def times(self, prefix: str) -> Iterator[tuple[str, float]]:
+        """Give what ``names`` gives, and when each was last written (Unix seconds)."""
 
     # -- objects --------------------------------------------------------------------------
 
@@ -73,7 +85,10 @@ class Medium(Protocol):
         """
 
     def refresh(self, digest: str, manifest: bytes) -> None:
-        """Keep an object from a collector that goes by age, since it is published again."""
+        """Make an object that is published again young, if it is older than an hour.
+
+        A collector leaves young objects alone, and this one gets its action only now.
+        """
 
     def objects(self) -> Iterator[str]:
         """Give the digest of every object, sorted."""
@@ -99,8 +114,12 @@ class Medium(Protocol):
     def quarantine(self, digest: str) -> bool:
         """Move a damaged object out of the way for autopsy; False if it was gone already."""
 
-    def remove(self, digest: str) -> None:
-        """Remove an object, so that at no instant a part of it looks like a whole."""
+    def remove(self, *digests: str) -> None:
+        """Remove objects, so that at no instant a part of one looks like a whole.
+
+        Their names are gone for good when it returns; their room may come back only with
+        ``sweep``.
+        """
 
     # -- room and order -------------------------------------------------------------------
 
@@ -114,7 +133,7 @@ class Medium(Protocol):
         """Give a folder on this machine for libraries that need files; then remove it."""
 
     def sweep(self) -> int:
-        """Remove what the dead left unfinished; return how many things."""
+        """Remove what was removed, and what the dead left unfinished; return how many things."""
 
     def explain(self, error: OSError) -> StoreError | None:
         """Return the store's own error for a full or read-only medium, else None."""

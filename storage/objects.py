@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from storage.digest import digest_bytes
 from storage.errors import CorruptArtifact, MissingArtifact, StoreFormatError
+from storage.forget import quarantine
 from storage.manifest import MANIFEST, Manifest
 from storage.medium import Level, Medium
 from storage.members import MemberWriter
@@ -46,7 +47,7 @@ def _is_whole(medium: Medium, digest: str) -> bool:
     except MissingArtifact:
         return False
     except CorruptArtifact:
-        medium.quarantine(digest)
+        quarantine(medium, digest)
         return False
     return True
 

@@ -6,15 +6,16 @@ What a store promises and how it is laid out stands in ``INVARIANTS.md``.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import time
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-from storage import actions, objects
-from storage.actions import ActionRecord
+from storage import actions, objects, pins
+from storage.actions import ActionRecord, action_name
 from storage.address import find_medium
-from storage.check import Problem, check_store
+from storage.check import Problem, action_problems, check_store
 from storage.errors import (
     CorruptArtifact,
     MissingArtifact,
@@ -24,12 +25,20 @@ from storage.errors import (
     StoreMissing,
 )
 from storage.folder import FolderMedium
+from storage.forget import forget, quarantine, use_name
+from storage.keep import GRACE_S, Keep
 from storage.leases import LEASE_S, Lease, LeaseTable
 from storage.manifest import Manifest
 from storage.medium import Level, Medium
 from storage.members import MemberReader
 from storage.objects import Published
+from storage.owner import Owner
+from storage.pins import Pin
 from storage.search import matches
+
+if TYPE_CHECKING:
+    from storage.collect import Collected
+    from storage.repair import Repaired
 
 FORMAT = 1
 HASH = "blake3-256"
@@ -197,13 +206,14 @@ class Store:
                 objects.verify(self.medium, output.object, self.verify_level)
             except MissingArtifact:
                 if mend:
-                    with self._explained():
-                        self._forget([key])
+                    self._forget_dangling(record)
                 return None, "evicted"
             except CorruptArtifact:
                 if mend:
                     self.discard(output.object)
                 return None, "corrupt"
+        if mend:
+            self.medium.touch(use_name(key))
         return record, "hit"
 
     def read(self, object_digest: str, expected: type[T]) -> T:
@@ -240,18 +250,15 @@ class Store:
 
     def discard(self, object_digest: str) -> None:
         """Put a damaged object into quarantine; every action that gave it is forgotten first."""
-        users = [
-            record.key
-            for record in actions.all_actions(self.medium)
-            if any(output.object == object_digest for output in record.outputs.values())
-        ]
         with self._explained():
-            self._forget(users)
-            self.medium.quarantine(object_digest)
+            quarantine(self.medium, object_digest)
 
-    def _forget(self, keys: list[str]) -> None:
-        for key in keys:
-            actions.delete_action(self.medium, key)
+    def _forget_dangling(self, record: ActionRecord) -> None:
+        """Forget an action without its objects, unless it has them again by now."""
+        with self._explained(), self.medium.collecting():
+            now = actions.read_action(self.medium, record.key)
+            if now is not None and action_problems(self.medium, action_name(record.key), set()):
+                forget(self.medium, [now])
 
     def _reader(self, object_digest: str) -> Any:
         from storage.codec.values import ValueReader
@@ -270,9 +277,8 @@ class Store:
         return actions.read_action(self.medium, key)
 
     def latest(self, scene: str, step: str, label: str = "") -> ActionRecord | None:
-        """Return the newest action of a scene's step, for explanations."""
-        key = actions.latest_key(self.medium, scene, step, label)
-        return None if key is None else actions.read_action(self.medium, key)
+        """Return the newest action of a scene's step, for explanations: it may be collected."""
+        return actions.latest_record(self.medium, scene, step, label)
 
     def latest_of_scene(self, scene: str) -> Iterator[tuple[str, str, ActionRecord]]:
         """Give (step, label, newest record) of all that ran for ``scene``."""
@@ -300,6 +306,102 @@ class Store:
     def verify(self, level: Level = "full") -> list[Problem]:
         """Check every object and every action; change nothing."""
         return check_store(self.medium, level)
+
+    def repair(self, level: Level = "full") -> list[Repaired]:
+        """Bring the store back to its invariants; damaged things go to quarantine.
+
+        Raises:
+            StoreFull, StoreReadOnly: it could not be done, or not all of it.
+        """
+        from storage.repair import repair
+
+        with self._explained():
+            return repair(self.medium, level)
+
+    def catalogue(self) -> Any:
+        """Return a ``pyarrow.Table`` of all actions (``storage.catalogue.COLUMNS``)."""
+        from storage.catalogue import read_catalogue
+
+        return read_catalogue(self.medium)
+
+    def compact(self) -> int:
+        """Write the catalogue anew, as one file; return its rows."""
+        from storage.catalogue import compact
+
+        with self._explained():
+            return compact(self.medium)
+
+    # -- keeping and letting go -----------------------------------------------------------
+
+    def pin(
+        self,
+        name: str,
+        digests: Iterable[str] = (),
+        *,
+        scenes: Iterable[str] = (),
+        reason: str = "",
+        for_s: float | None = None,
+    ) -> Pin:
+        """Hold keys, objects or contents, and all of some scenes, against collection.
+
+        Args:
+            name: a plain word, not in use.
+            digests: whole digests of keys, objects or contents.
+            scenes: names of scenes; what is made for them later is held too.
+            reason: for people.
+            for_s: hold it for this process only, and at most so many seconds.
+
+        Raises:
+            StoreError: the name is taken or no plain word, or a digest is none.
+        """
+        pin = Pin(
+            name,
+            tuple(digests),
+            tuple(scenes),
+            reason,
+            created=time.time(),
+            owner=None if for_s is None else Owner.here(),
+            expires_at=None if for_s is None else time.time() + for_s,
+        )
+        with self._explained(), self.medium.publishing():
+            pins.create_pin(self.medium, pin)
+        return pin
+
+    def unpin(self, name: str) -> bool:
+        """Let go of what a pin held; False if there is none of this name."""
+        with self._explained():
+            return pins.delete_pin(self.medium, name)
+
+    def pins(self) -> list[Pin]:
+        """Return the pins that hold something, by name; StoreError if one cannot be read."""
+        return list(pins.all_pins(self.medium))
+
+    def collect(
+        self,
+        *,
+        quota_bytes: int | None = None,
+        grace_s: float = GRACE_S,
+        keep: Keep = Keep(),
+        dry_run: bool = False,
+    ) -> Collected:
+        """Remove what no action needs, and forget actions by policy (``storage.keep``).
+
+        Args:
+            quota_bytes: what all objects may take; the longest unused go first.
+            grace_s: what was made or used within so many seconds stays.
+            keep: what else stays.
+            dry_run: only tell.
+
+        Raises:
+            StoreError: a pin cannot be read.
+            StoreReadOnly, StoreFull: nothing could be changed.
+        """
+        from storage.collect import collect
+
+        with self._explained():
+            return collect(
+                self.medium, keep, quota_bytes=quota_bytes, grace_s=grace_s, dry_run=dry_run
+            )
 
     # -- room to work in ------------------------------------------------------------------
 
