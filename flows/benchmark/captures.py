@@ -34,15 +34,22 @@ from tasks.step import Ref, RunContext, load, run_context
 Row = dict[str, Any]
 
 
-def reconstructed_scene(folder: Path, store: Store) -> SceneValues:
-    """Run the whole pipeline on a capture (or find it in the store) and load everything."""
+def scene_of(folder: Path, package: Path) -> SceneRequest:
+    """Return the request for a capture with its own targets and the default preset."""
     capture = find_capture(folder, None)
     targets: tuple[Target, ...] = ()
     if capture.targets_file:
         targets = parse_targets(json.loads(capture.targets_file.read_text("utf-8")))
-    request = SceneRequest(capture.name, capture.source, targets, Preset(), folder)
-    with run_context(RunContext(store=store, scene=capture.name)) as context:
-        refs = factorize_scene(capture.source, targets, Preset(), SceneRefs(targets))
+    return SceneRequest(capture.name, capture.source, targets, Preset(), package)
+
+
+def reconstructed_scene(folder: Path, store: Store) -> SceneValues:
+    """Run the whole pipeline on a capture (or find it in the store) and load everything."""
+    request = scene_of(folder, folder)
+    with run_context(RunContext(store=store, scene=request.name)) as context:
+        refs = factorize_scene(
+            request.source, request.targets, Preset(), SceneRefs(request.targets)
+        )
         return load_values(SceneResult(request, refs, list(context.outcomes)))
 
 

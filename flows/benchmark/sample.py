@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from flows.benchmark.corner_truth import CornerTruth, TruthObject
+from flows.benchmark.measure import Measure
 from flows.report.values import ObjectValues, SceneValues
 from garden_models.geometry.rigid import invert_rigid, transform_points
 from garden_models.metrics.camera_pose import (
@@ -24,28 +25,6 @@ from garden_models.scene import Reconstruction
 
 MIN_VISIBLE_PIXELS = 100
 """Views in which the truth shows less of an object say nothing of its mask."""
-
-
-@dataclass(frozen=True)
-class Measure:
-    """One measured number beside what it has to be."""
-
-    name: str
-    value: float
-    limit: float
-    unit: str
-    at_least: bool = False
-
-    @property
-    def holds(self) -> bool:
-        """Whether the number is within its limit."""
-        return self.value >= self.limit if self.at_least else self.value <= self.limit
-
-    def line(self) -> str:
-        """Return one line of the printed table."""
-        sign = ">=" if self.at_least else "<="
-        mark = "ok  " if self.holds else "MISS"
-        return f"{mark}  {self.name:<44} {self.value:9.3f} {sign} {self.limit:g} {self.unit}"
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import argparse
 import dataclasses
 from pathlib import Path
 
+from flows.benchmark.orchestration.options import add_options, from_arguments
 from flows.command import EXIT_FAILED, EXIT_OK, print_json, say
 from flows.command.scene_options import open_store
 from storage import Store
@@ -15,9 +16,12 @@ DESCRIPTION = """\
   garden benchmark depth CAPTURE ...     depth with estimated cameras, after one scale a scene,
                                          beside a plain plane sweep: error and time
   garden benchmark gravity CAPTURE ...   gravity with cameras given and with cameras estimated
+  garden benchmark orchestration         what a step, a publish and a scene cost beside their
+                                         peers, and a thousand simulated scenes
 
 depth and gravity need captures with cameras.json (and depth/) as truth. Results come from
-the store where they are there. Exit code 1 if a measure of `sample` misses its limit."""
+the store where they are there. Exit code 1 if a measure of `sample` or `orchestration`
+misses its limit. orchestration works in the store's folder, but shares nothing with it."""
 
 SAMPLE = Path("tests/scenes/corner")
 
@@ -25,8 +29,9 @@ SAMPLE = Path("tests/scenes/corner")
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.description = DESCRIPTION
-    parser.add_argument("name", choices=("sample", "depth", "gravity"))
+    parser.add_argument("name", choices=("sample", "depth", "gravity", "orchestration"))
     parser.add_argument("captures", nargs="*", type=Path, metavar="CAPTURE")
+    add_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -34,6 +39,8 @@ def run(options: argparse.Namespace) -> int:
     store = open_store(options)
     if options.name == "sample":
         return _sample(options, store)
+    if options.name == "orchestration":
+        return _orchestration(options, store)
     from flows.benchmark.captures import depth_rows, gravity_row, table
 
     rows = []
@@ -64,3 +71,25 @@ def _sample(options: argparse.Namespace, store: Store) -> int:
         for measure in measures:
             print(measure.line())
     return EXIT_OK if all(m.holds for m in measures) else EXIT_FAILED
+
+
+def _orchestration(options: argparse.Namespace, store: Store) -> int:
+    from flows.benchmark.orchestration.measure_all import measure_all
+    from flows.benchmark.orchestration.peers.all_peers import PeerMissing
+    from flows.benchmark.orchestration.scene_overhead import SceneFailed
+    from flows.benchmark.orchestration.step_cost import WrongResult
+
+    asked = from_arguments(options)
+    try:
+        with store.scratch() as folder:
+            report = measure_all(asked, folder, say)
+    except (PeerMissing, WrongResult, SceneFailed) as error:
+        say(f"garden: {error}")
+        return EXIT_FAILED
+    if asked.out is not None:
+        report.write(asked.out)
+    if options.json:
+        print_json(report.to_json())
+    else:
+        print(report.to_text())
+    return EXIT_OK if report.holds else EXIT_FAILED

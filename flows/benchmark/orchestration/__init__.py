@@ -1,0 +1,1 @@
+"""Measure what orchestration costs: a step beside its peers, and a thousand scenes."""
