@@ -1,0 +1,20 @@
+"""Turn a verdict into the state that Prefect shows for a flow run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from prefect.states import Completed, Failed, State
+
+from storage.redact import redact
+
+
+def verdict_state(status: str, reasons: Sequence[str], data: dict[str, Any]) -> State[Any]:
+    """Return Completed for ``ok``, Completed called Degraded, or Failed, with the reasons."""
+    message = redact("; ".join(reasons))
+    if status == "failed":
+        return Failed(message=message or "failed without a reason")
+    if status == "degraded":
+        return Completed(name="Degraded", message=message, data=data)
+    return Completed(message=message or None, data=data)
