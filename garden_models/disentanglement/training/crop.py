@@ -17,31 +17,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from garden_models.disentanglement.training.pair import Condition, LabelledCloud
+from garden_models.disentanglement.training.pairs_config import CropConfig
 from garden_models.disentanglement.training.scenes.room import Room
 
 PRESSED = 0.0008
 """Metres within which a resting base and its carrier are one surface."""
-
-
-@dataclass(frozen=True)
-class CropConfig:
-    """Sizes of crops; ranges are uniform."""
-
-    sideways: tuple[float, float] = (0.1, 0.6)
-    above: tuple[float, float] = (0.1, 0.5)
-    below: tuple[float, float] = (0.03, 0.3)
-    """Expansion of the box on each side, of the object's longest extent."""
-    pool: int = 8192
-    """Points drawn; augmentations choose among them."""
-    samples: int = 2048
-    """Condition points."""
-    least_size: float = 0.03
-    most_size: float = 3.0
-    least_extent: float = 0.008
-    """Metres; what is smaller, larger or flatter is no target (supplement: extreme dimensions,
-    degenerate boxes)."""
-    least_positive: float = 0.03
-    """Share of a crop's points that must be the object's."""
 
 
 @dataclass(frozen=True)
@@ -188,5 +168,5 @@ def _in_triangles(
         edge, to = b - a, points[:, None] - a
         side.append(edge[:, 0] * to[..., 1] - edge[:, 1] * to[..., 0])
     signs = np.stack(side)
-    inside = (signs >= -1e-12).all(axis=0) | (signs <= 1e-12).all(axis=0)
-    return np.asarray(inside.any(axis=1))
+    inside = np.logical_or((signs >= -1e-12).all(axis=0), (signs <= 1e-12).all(axis=0))
+    return np.asarray(np.any(inside, axis=1))

@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from garden_models.disentanglement.training.augmentations.augment import augment
-from garden_models.disentanglement.training.augmentations.config import NONE, Augmentations
-from garden_models.disentanglement.training.crop import (
-    CropConfig,
-    RoomTriangles,
-    cut,
-    is_target,
-    turned,
-)
+from garden_models.disentanglement.training.crop import RoomTriangles, cut, is_target, turned
 from garden_models.disentanglement.training.pair import (
     CONTEXT_POINTS,
     LabelledCloud,
@@ -22,26 +13,11 @@ from garden_models.disentanglement.training.pair import (
     PairShard,
     stacked,
 )
+from garden_models.disentanglement.training.pairs_config import PairsConfig
 from garden_models.disentanglement.training.scenes.furnish import Meshes, furnish
 from garden_models.disentanglement.training.scenes.room import Room
 from garden_models.disentanglement.training.splits import SPLITS, Split
 from garden_models.progress import Progress, silent
-
-
-@dataclass(frozen=True)
-class PairsConfig:
-    """How pairs are made."""
-
-    points: int = 3072
-    """Points of a pair; the first ``CONTEXT_POINTS`` are context."""
-    pairs_a_room: int = 12
-    augmentations: Augmentations = field(default_factory=Augmentations)
-    augmented: float = 1.0
-    """Share of the pairs that are augmented."""
-    crop: CropConfig = field(default_factory=CropConfig)
-
-
-CLEAN = PairsConfig(augmentations=NONE, augmented=0.0)
 
 
 def make_shard(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from garden_models.disentanglement.training.augmentations.config import Augmentations
+from garden_models.disentanglement.training.augmentations.config import NAMES, Augmentations
 from garden_models.disentanglement.training.augmentations.ghosting import add_ghosts
 from garden_models.disentanglement.training.augmentations.mesh_jitter import jitter_mesh
 from garden_models.disentanglement.training.augmentations.stereo_noise import add_stereo_noise
@@ -22,18 +22,20 @@ def augment(
     """Return cloud and condition with the artifacts of a real reconstruction."""
     unit = config.unit(condition.size)
     voxel = config.voxel_m * unit
-    if config.thin_parts.on:
+    drawn = dict(zip(NAMES, rng.random(len(NAMES)) < config.each, strict=True))
+    on = {name: drawn[name] and getattr(config, name).on for name in NAMES}
+    if on["thin_parts"]:
         cloud = deform_thin_parts(cloud, rng, config.thin_parts, voxel)
-    if config.virtual_scan.on or config.stereo_noise.on:
+    if on["virtual_scan"] or on["stereo_noise"]:
         seen = scan(cloud.points, rng, config.virtual_scan)
-        if config.virtual_scan.on:
+        if on["virtual_scan"]:
             kept = keep_seen(cloud, seen, rng, config.virtual_scan)
             cloud, seen = cloud.subset(kept), _subset(seen, kept)
-        if config.stereo_noise.on:
+        if on["stereo_noise"]:
             cloud = add_stereo_noise(cloud, seen, rng, config.stereo_noise)
-    if config.ghosting.on:
+    if on["ghosting"]:
         cloud = add_ghosts(cloud, rng, config.ghosting, voxel)
-    if config.mesh_jitter.on:
+    if on["mesh_jitter"]:
         condition = jitter_mesh(condition, rng, config.mesh_jitter, unit)
     return cloud, condition
 

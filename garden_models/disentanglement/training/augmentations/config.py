@@ -63,6 +63,8 @@ class MeshJitter:
     stretch: tuple[float, float] = (0.85, 1.15)
     yaw_deg: float = 20.0
     translation_m: float = 0.36
+    gentle: float = 0.0
+    """Share of the pairs whose jitter is a tenth of that: a placement that went well."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,8 @@ class Augmentations:
     virtual_scan: VirtualScan = field(default_factory=VirtualScan)
     mesh_jitter: MeshJitter = field(default_factory=MeshJitter)
     stereo_noise: StereoNoise = field(default_factory=StereoNoise)
+    each: float = 1.0
+    """Probability with which each of them is applied to a pair."""
     voxel_m: float = 0.15
     relative: bool = True
     reference_m: float = 1.0

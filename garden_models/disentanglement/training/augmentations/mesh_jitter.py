@@ -17,9 +17,10 @@ def jitter_mesh(
     """
     low, high = condition.box
     centre = (low + high) / 2
-    factor = rng.uniform(*config.scale) * rng.uniform(*config.stretch, 3)
-    angle = np.radians(rng.uniform(-config.yaw_deg, config.yaw_deg))
-    shift = rng.uniform(-1, 1, 3) * config.translation_m * unit
+    strength = 0.1 if rng.random() < config.gentle else 1.0
+    factor = 1 + strength * (rng.uniform(*config.scale) * rng.uniform(*config.stretch, 3) - 1)
+    angle = np.radians(strength * rng.uniform(-config.yaw_deg, config.yaw_deg))
+    shift = strength * rng.uniform(-1, 1, 3) * config.translation_m * unit
     c, s = np.cos(angle), np.sin(angle)
     linear = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) * factor
 

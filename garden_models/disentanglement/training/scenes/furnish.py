@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -132,7 +133,7 @@ class _Furnisher:
             return
         table, seat = self.placed[at], self.shape("chair", again=0.6)
         for side in range(int(self.rng.integers(0, 7))):
-            self.add(lambda side=side: self._chair(table, seat, side), ignore=(at,))
+            self.add(partial(self._chair, table, seat, side), ignore=(at,))
 
     def _chair(self, table: Instance, seat: Shape, side: int) -> Instance:
         """Return a chair that faces one side of a table, pushed in or drawn out."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from garden_models.disentanglement.training.shapes.shape import Draft, Shelf
-from garden_models.disentanglement.training.shapes.solid import lathe, slab, tube
+from garden_models.disentanglement.training.shapes.solid import Solid, lathe, slab, tube
 
 Rng = np.random.Generator
 
@@ -14,13 +14,14 @@ def shelf(rng: Rng) -> Draft:
     """Return an open shelf of boards between sides or posts, with or without a back."""
     width, depth, height = rng.uniform(0.4, 1.4), rng.uniform(0.22, 0.42), rng.uniform(0.5, 2.0)
     thick, boards = rng.uniform(0.015, 0.03), max(2, int(height / rng.uniform(0.28, 0.45)))
-    parts, shelves = [], []
+    parts: list[Solid] = []
+    shelves: list[Shelf] = []
     levels = np.linspace(thick + rng.uniform(0.0, 0.1), height, boards)
     for k, level in enumerate(levels):
         parts.append(slab(width - 2 * thick, thick, depth, (0, level - thick, 0)))
-        free = levels[k + 1] - level - thick if k + 1 < boards else 2.0
+        free = float(levels[k + 1] - level - thick) if k + 1 < boards else 2.0
         inner = width / 2 - thick
-        shelves.append(Shelf(level, (-inner, inner), (-depth / 2, depth / 2), float(free)))
+        shelves.append(Shelf(float(level), (-inner, inner), (-depth / 2, depth / 2), free))
     if rng.random() < 0.7:
         for side in (-1, 1):
             parts.append(slab(thick, height, depth, (side * (width - thick) / 2, 0, 0)))

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 Points = Float[np.ndarray, "n 3"]
+Numbers = Sequence[float] | np.ndarray
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def merged(solids: Sequence[Solid]) -> Solid:
     )
 
 
-def block(low: Sequence[float], high: Sequence[float]) -> Solid:
+def block(low: Numbers, high: Numbers) -> Solid:
     """Return the axis-parallel box between two corners."""
     a, b = np.asarray(low, float), np.asarray(high, float)
     corners = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
@@ -57,7 +58,7 @@ def block(low: Sequence[float], high: Sequence[float]) -> Solid:
     return Solid(a + corners * (b - a), np.array(faces))
 
 
-def slab(width: float, height: float, depth: float, at: Sequence[float] = (0, 0, 0)) -> Solid:
+def slab(width: float, height: float, depth: float, at: Numbers = (0, 0, 0)) -> Solid:
     """Return a box that stands on ``at``, the centre of its underside."""
     x, y, z = at
     return block((x - width / 2, y, z - depth / 2), (x + width / 2, y + height, z + depth / 2))
@@ -84,7 +85,9 @@ def lathe(profile: Sequence[tuple[float, float]], segments: int = 24) -> Solid:
     return _without_slivers(np.concatenate(rings), np.concatenate(faces))
 
 
-def tube(path: Sequence[Sequence[float]], radius: float | Sequence[float], sides: int = 8) -> Solid:
+def tube(
+    path: Sequence[Sequence[float]] | np.ndarray, radius: float | Numbers, sides: int = 8
+) -> Solid:
     """Return a round bar along a path of at least two points, closed at both ends."""
     points = np.asarray(path, float)
     radii = np.broadcast_to(np.asarray(radius, float), len(points))
@@ -108,8 +111,8 @@ def tube(path: Sequence[Sequence[float]], radius: float | Sequence[float], sides
 
 
 def ellipsoid(
-    radii: Sequence[float],
-    at: Sequence[float] = (0, 0, 0),
+    radii: Numbers,
+    at: Numbers = (0, 0, 0),
     squareness: float = 1.0,
     segments: int = 18,
 ) -> Solid:
