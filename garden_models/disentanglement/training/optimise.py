@@ -9,13 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 import safetensors.torch
 import torch
 import torch.nn.functional as F
-from jaxtyping import Float, Int
+from jaxtyping import Int
 from torch import Tensor
 
 from garden_models.disentanglement.network.config import NetworkConfig
@@ -23,20 +22,11 @@ from garden_models.disentanglement.network.model import PointClassifier
 from garden_models.disentanglement.training.config import Optimisation
 from garden_models.disentanglement.training.described import DescribedShard
 from garden_models.disentanglement.training.pair import CONTEXT_POINTS
+from garden_models.disentanglement.training.state import TrainingState
 from garden_models.disentanglement.training.symmetry import symmetry
 from garden_models.progress import Progress, silent
 
 _MOMENTS = ("exp_avg", "exp_avg_sq", "step")
-
-
-@dataclass(frozen=True)
-class TrainingState:
-    """A training after ``step`` steps: weights and moments as safetensors, losses so far."""
-
-    SCHEMA: ClassVar[str] = "garden.TrainingState/1"
-    step: int
-    tensors: bytes
-    losses: Float[np.ndarray, " s"]
 
 
 def start(network: NetworkConfig, config: Optimisation) -> TrainingState:

@@ -25,7 +25,9 @@ def add_stereo_noise(
     camera = _giver(seen, rng)
     rows = np.arange(len(points))
     depth, near, far = (values[camera, rows] for values in (seen.depth, seen.near, seen.far))
-    at_edge = np.isfinite(near) & np.isfinite(far) & (far - near > EDGE * near)
+    known = np.isfinite(near) & np.isfinite(far)
+    far = np.where(known, far, near)
+    at_edge = known & (far > (1 + EDGE) * near)
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     sigma = config.sigma + config.growth * np.maximum(depth / diagonal - 1, -0.5)
     common = smooth_field(points, 0.1 * diagonal, 1, rng)[:, 0]
@@ -33,7 +35,8 @@ def add_stereo_noise(
     share = config.correlated
     error = sigma * (np.sqrt(share) * common + np.sqrt(1 - share) * own)
     smeared = at_edge & (rng.random(len(points)) < config.smeared)
-    between = near + rng.random(len(points)) * (far - near)
+    span = np.subtract(far, near, out=np.zeros_like(far), where=at_edge)
+    between = np.where(at_edge, near, depth) + rng.random(len(points)) * span
     factor = np.where(smeared, between / np.maximum(depth, 1e-9), 1 + error)
     eye = seen.eye[camera]
     moved = eye + (points - eye) * factor[:, None]

@@ -51,9 +51,10 @@ def cabinet(rng: Rng) -> Draft:
     raised = rng.uniform(0.008, 0.02)
     for i in range(columns):
         for j in range(rows):
-            x, y = (i + 0.5) * w - width / 2, base + j * h
-            parts.append(slab(w - 0.01, h - 0.01, raised, (x, y + 0.005, depth / 2 + raised / 2)))
-            handle = (x, y + h / 2, depth / 2 + raised + 0.012)
+            across, up = (i + 0.5) * w - width / 2, base + j * h
+            front = (across, up + 0.005, depth / 2 + raised / 2)
+            parts.append(slab(w - 0.01, h - 0.01, raised, front))
+            handle = (across, up + h / 2, depth / 2 + raised + 0.012)
             parts.append(slab(min(0.12, w / 2), 0.012, 0.024, handle))
     top = Shelf(height, (-width / 2, width / 2), (-depth / 2, depth / 2))
     return Draft(parts, [top] if height < 1.5 else [])
