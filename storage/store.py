@@ -44,6 +44,8 @@ FORMAT = 1
 HASH = "blake3-256"
 _KNOWN = {"format": FORMAT, "hash": HASH}
 MARKER = "store.json"
+_NEW_S = 3600.0
+"""A record says itself that it was in use when it was made: so long its uses leave no mark."""
 
 T = TypeVar("T")
 
@@ -212,7 +214,7 @@ class Store:
                 if mend:
                     self.discard(output.object)
                 return None, "corrupt"
-        if mend:
+        if mend and time.time() - record.started > _NEW_S:
             self.medium.touch(use_name(key))
         return record, "hit"
 
