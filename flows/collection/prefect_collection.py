@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from prefect.settings import PREFECT_API_URL, temporary_settings
-
 from flows.collection.prefect_server import server_address
 from flows.prefect_flow import collection_flow, of_collection
 
@@ -15,11 +13,12 @@ def in_collection_flow(name: str, body: Callable[[], None], environment: dict[st
 
     ``environment`` is that of the processes which it starts: they are told the server.
     """
+    from prefect.settings import PREFECT_API_URL, temporary_settings
 
     def run() -> None:
         body()
 
-    with server_address() as address, temporary_settings({PREFECT_API_URL: address}):
-        environment["PREFECT_API_URL"] = address
-        with of_collection(name):
-            collection_flow(name)(run)()
+    address = server_address()
+    environment["PREFECT_API_URL"] = address
+    with temporary_settings({PREFECT_API_URL: address}), of_collection(name):
+        collection_flow(name)(run)()

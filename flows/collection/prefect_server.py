@@ -5,37 +5,37 @@ Prefect's own temporary server outlives a killed batch; this one dies with it.
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import functools
 import os
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 from tasks.step.child import die_with
 
 START_S = 180.0
 
 
-@contextmanager
-def server_address() -> Iterator[str]:
-    """Give the API address of the server that is configured, else of one started here.
+def server_address() -> str:
+    """Return the API address of the server that is configured, else of this process' own.
 
-    Raises RuntimeError if it does not start.
+    That one is started when it is first asked for and ends with the process: Prefect still
+    sends to it when a flow run has ended. Raises RuntimeError if it does not start.
     """
     from prefect.settings import PREFECT_API_URL
 
     configured = PREFECT_API_URL.value()
-    if configured:
-        yield str(configured)
-        return
-    listening = socket.socket()
-    with listening:
+    return str(configured) if configured else _own_server()
+
+
+@functools.cache
+def _own_server() -> str:
+    with socket.socket() as listening:
         listening.bind(("127.0.0.1", 0))
         listening.listen(128)
-        port = listening.getsockname()[1]
         process = subprocess.Popen(
             [sys.executable, "-m", __name__, str(listening.fileno()), str(os.getpid())],
             stdin=subprocess.DEVNULL,
@@ -45,16 +45,22 @@ def server_address() -> Iterator[str]:
             start_new_session=True,
             env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )
-    try:
-        address = f"http://127.0.0.1:{port}/api"
-        _wait_for(address, process)
-        yield address
-    finally:
+        address = f"http://127.0.0.1:{listening.getsockname()[1]}/api"
+    _started.append(process)
+    _wait_for(address, process)
+    return address
+
+
+_started: list[subprocess.Popen[bytes]] = []
+
+
+@atexit.register  # before Prefect is imported: after what it still has to send
+def _stop() -> None:
+    for process in _started:
         process.terminate()
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(timeout=15)
         process.kill()
-        process.wait()
 
 
 def _wait_for(address: str, process: subprocess.Popen[bytes]) -> None:
