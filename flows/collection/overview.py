@@ -64,7 +64,7 @@ def scene_line(row: SceneRow) -> str:
         facts.append(f"{row.objects[1]} of {row.objects[0]} objects")
     if row.executed:
         facts.append(f"{row.executed} steps in {duration(row.seconds)}")
-    elif row.cached:
+    elif row.cached and row.status in ENDED:
         facts.append("nothing to do")
     text = f"{MARKS[row.status]} {row.name:<24} {row.status:<9} {', '.join(facts)}"
     if row.status != "ok" and row.reasons:
