@@ -130,9 +130,18 @@ def _keep_conflict(medium: Medium, record: ActionRecord) -> None:
     medium.create(f"conflicts/{name[:2]}/{name[2:]}-{outcome}.json", record.to_bytes())
 
 
+def all_conflicts(medium: Medium) -> Iterator[ActionRecord]:
+    """Give every readable record that came second and differed."""
+    yield from _records(medium, "conflicts/")
+
+
 def all_actions(medium: Medium) -> Iterator[ActionRecord]:
     """Give every readable record, in no particular order."""
-    for name in medium.names("actions/"):
+    yield from _records(medium, "actions/")
+
+
+def _records(medium: Medium, prefix: str) -> Iterator[ActionRecord]:
+    for name in medium.names(prefix):
         data = medium.read(name)
         try:
             if data is not None:

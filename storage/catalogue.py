@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 _PLACE = "catalog/"
 _WORTH_A_PART = 200  # new rows; fewer are read from their records each time
 
+_IDENTITY = ("action", "recorded")
+
 COLUMNS = {
     "key": "string",
     "step": "string",
@@ -59,12 +61,35 @@ def read_catalogue(medium: Medium, *, keep: bool = True) -> Any:
     With ``keep`` new rows are kept in a new part when they are many, and damaged parts are
     removed; where nothing can be written nothing is kept.
     """
-    import pyarrow as pa
     import pyarrow.compute as pc
 
+    table = _read(medium, list(COLUMNS), keep)
+    return table.take(pc.sort_indices(table, [("key", "ascending"), ("output", "ascending")]))
+
+
+def read_columns(medium: Medium, *columns: str) -> list[tuple[Any, ...]]:
+    """Return some columns of the table as tuples, the action that started last at the end.
+
+    A store without parts and with few actions needs no pyarrow for this.
+    """
+    wanted = [*columns, "started"]
+    times = dict(medium.times("actions/"))
+    if len(times) < _WORTH_A_PART and not any(medium.names(_PLACE)):
+        rows = [tuple(row[name] for name in wanted) for row in _rows(medium, times)]
+    else:
+        table = _read(medium, wanted, keep=True)
+        rows = list(zip(*(table[name].to_pylist() for name in wanted), strict=True))
+    return [row[:-1] for row in sorted(rows, key=lambda row: row[-1])]
+
+
+def _read(medium: Medium, columns: list[str], keep: bool) -> Any:
+    """Return columns of the rows in parts that still hold, and of the actions not in them."""
+    import pyarrow as pa
+
     written = dict(medium.times("actions/"))
-    parts, damaged = _read_parts(medium)
-    known = pa.concat_tables([_table([]), *_distinct(parts, written)])
+    needed = list(dict.fromkeys([*columns, *_IDENTITY]))
+    parts, damaged = _read_parts(medium, needed)
+    known = pa.concat_tables([_table([]).select(needed), *_distinct(parts, written)])
     held = set(known["action"].to_pylist())
     missing = _table(_rows(medium, {n: t for n, t in written.items() if n not in held}))
     if keep:
@@ -72,8 +97,7 @@ def read_catalogue(medium: Medium, *, keep: bool = True) -> Any:
             medium.delete(*damaged)
             if len(missing) >= _WORTH_A_PART:
                 _keep_part(medium, missing)
-    table = pa.concat_tables([known, missing])
-    return table.take(pc.sort_indices(table, [("key", "ascending"), ("output", "ascending")]))
+    return pa.concat_tables([known, missing.select(needed)]).select(columns)
 
 
 def compact(medium: Medium) -> int:
@@ -157,8 +181,8 @@ def _distinct(parts: list[Any], written: dict[str, float]) -> Iterable[Any]:
         yield part.filter(pa.array(stands, pa.bool_()))
 
 
-def _read_parts(medium: Medium) -> tuple[list[Any], list[str]]:
-    """Return the tables of the sound parts of these columns, and the names of the others."""
+def _read_parts(medium: Medium, columns: list[str]) -> tuple[list[Any], list[str]]:
+    """Return the tables of the sound parts, and the names of the others."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -171,8 +195,10 @@ def _read_parts(medium: Medium) -> tuple[list[Any], list[str]]:
         table = None
         if name == _part_name(data):
             with suppress(pa.ArrowInvalid, OSError):
-                table = pq.read_table(pa.BufferReader(data), page_checksum_verification=True)
-        if table is not None and table.schema.equals(schema):
+                part = pq.ParquetFile(pa.BufferReader(data), page_checksum_verification=True)
+                if part.schema_arrow.equals(schema):
+                    table = part.read(columns).select(columns)
+        if table is not None:
             tables.append(table)
         else:
             damaged.append(name)

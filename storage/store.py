@@ -34,6 +34,7 @@ from storage.members import MemberReader
 from storage.objects import Published
 from storage.owner import Owner
 from storage.pins import Pin
+from storage.quota import Quota, configured_quota
 from storage.search import matches
 
 if TYPE_CHECKING:
@@ -53,9 +54,12 @@ T = TypeVar("T")
 class Store:
     """An artifact store in a folder or a bucket. Safe for many threads and processes at once."""
 
-    def __init__(self, medium: Medium, *, verify: Level = "manifest") -> None:
+    def __init__(
+        self, medium: Medium, *, verify: Level = "manifest", quota_bytes: int | None = None
+    ) -> None:
         self.medium = medium
         self.verify_level: Level = verify
+        self._quota = None if quota_bytes is None else Quota(medium, quota_bytes)
 
     @classmethod
     def open(
@@ -66,6 +70,7 @@ class Store:
         durability: Literal["full", "none"] = "full",
         verify: Level = "manifest",
         lease_s: float = LEASE_S,
+        quota_bytes: int | None = None,
     ) -> Store:
         """Open the store at ``address``; make a new one there if ``create``.
 
@@ -75,6 +80,8 @@ class Store:
             durability: ``none`` skips fsync (for tests).
             verify: how thoroughly a hit is checked before it counts.
             lease_s: seconds after which a lease that is not renewed ends.
+            quota_bytes: what its objects may take (default: ``$GARDEN_STORE_QUOTA``, else
+                no limit); see ``make_room``.
 
         Raises:
             StoreMissing: there is none and ``create`` is False, or there is no such bucket.
@@ -83,7 +90,8 @@ class Store:
             StoreFull, StoreReadOnly: it cannot be made there.
         """
         medium = find_medium(address, durable=durability == "full", lease_s=lease_s)
-        store = cls(medium, verify=verify)
+        quota = configured_quota() if quota_bytes is None else quota_bytes
+        store = cls(medium, verify=verify, quota_bytes=quota)
         marker = store._marker()
         if marker is None:
             if not create:
@@ -157,7 +165,20 @@ class Store:
             manifest = write_value(value, staged)
             staged.sync()
             with self.medium.publishing():
-                return objects.seal(self.medium, staged, manifest)
+                published = objects.seal(self.medium, staged, manifest)
+        if self._quota is not None:
+            self._quota.add(published.bytes)
+        return published
+
+    def make_room(self) -> None:
+        """Before a step begins: collect what may go if the store has come near its quota.
+
+        Raises:
+            StoreFull: it is at its quota, and nothing more may be forgotten.
+        """
+        if self._quota is not None:
+            with self._explained():
+                self._quota.make_room()
 
     def record(self, record: ActionRecord) -> ActionRecord:
         """Publish an action record; return the one that counts (the first of its key).
@@ -282,6 +303,10 @@ class Store:
         """Return the newest action of a scene's step, for explanations: it may be collected."""
         return actions.latest_record(self.medium, scene, step, label)
 
+    def has_run(self, scene: str, step: str, label: str = "") -> bool:
+        """Tell whether a scene's step has run, whatever is left of it."""
+        return actions.latest_key(self.medium, scene, step, label) is not None
+
     def latest_of_scene(self, scene: str) -> Iterator[tuple[str, str, ActionRecord]]:
         """Give (step, label, newest record) of all that ran for ``scene``."""
         for step, label, key in actions.latest_of_scene(self.medium, scene):
@@ -291,7 +316,26 @@ class Store:
 
     def find(self, text: str) -> list[ActionRecord]:
         """Return the actions that ``text`` names (``storage.search``), the newest last."""
-        return [record for record in self.actions() if matches(record, text)]
+        from storage.catalogue import read_columns
+
+        columns = ("key", "scene", "step", "label", "object", "content")
+        keys = (row[0] for row in read_columns(self.medium, *columns) if matches(text, *row))
+        found = (actions.read_action(self.medium, key) for key in dict.fromkeys(keys))
+        return [record for record in found if record is not None]
+
+    def makers(self) -> dict[str, str]:
+        """Return the key of the newest action that gave each content."""
+        from storage.catalogue import read_columns
+
+        return dict(read_columns(self.medium, "content", "key"))
+
+    def remembered(self, scene: str) -> Iterator[ActionRecord]:
+        """Give the actions of a scene's steps that were forgotten but are still explained."""
+        return actions.remembered(self.medium, scene)
+
+    def conflicts(self) -> Iterator[ActionRecord]:
+        """Give every record that came second for its key with another result."""
+        return actions.all_conflicts(self.medium)
 
     def objects(self) -> Iterator[tuple[str, int]]:
         """Give every object's digest and the bytes of its members."""

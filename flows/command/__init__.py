@@ -19,7 +19,7 @@ COMMANDS = {
     "status": "tell how a collection stands, also while it runs in another terminal",
     "plan": "tell what factorize would run and why, without running it",
     "why": "tell from which steps and inputs an artifact came",
-    "store": "list or verify what the artifact store holds",
+    "store": "list, check, repair, pin and collect what the artifact store holds",
     "benchmark": "measure depth, gravity and whole scenes against captures with truth",
     "doctor": "tell what this machine can run and what is missing",
 }
@@ -75,15 +75,20 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(options, str(error), EXIT_WRONG_USE)
 
 
-def add_shared_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options that every subcommand takes."""
+def add_shared_options(parser: argparse.ArgumentParser, *, nested: bool = False) -> None:
+    """Add the options that every subcommand takes; ``nested`` if a parser above has them too."""
+    unset = argparse.SUPPRESS if nested else None
     parser.add_argument(
         "--store",
         metavar="FOLDER|s3://BUCKET/PREFIX",
+        default=unset,
         help="artifact store (default: $GARDEN_STORE, else garden/store in the user's cache)",
     )
     parser.add_argument(
-        "--json", action="store_true", help="print one JSON document on standard output"
+        "--json",
+        action="store_true",
+        default=argparse.SUPPRESS if nested else False,
+        help="print one JSON document on standard output",
     )
 
 

@@ -10,7 +10,7 @@ from flows.collection.definition import Collection, read_collection
 from flows.collection.run import ONLY_FAILED, CollectionResult, chosen_names, run_collection
 from flows.collection.state import PAGE, read_state
 from flows.command import EXIT_FAILED, EXIT_OF_STATUS, EXIT_OK, print_json, say
-from flows.command.scene_options import open_store, store_address
+from flows.command.store_option import open_store, store_address
 from flows.preset import read_preset
 from storage import Store
 from tasks.step import Budget

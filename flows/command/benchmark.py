@@ -8,7 +8,7 @@ from pathlib import Path
 
 from flows.benchmark.orchestration.options import add_options, from_arguments
 from flows.command import EXIT_FAILED, EXIT_OK, print_json, say
-from flows.command.scene_options import open_store
+from flows.command.store_option import open_store
 from storage import Store
 
 DESCRIPTION = """\

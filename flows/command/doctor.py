@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from flows.command import EXIT_FAILED, EXIT_OK, print_json
-from flows.command.scene_options import store_address
+from flows.command.store_option import store_address
 from storage import StoreError
 from storage.address import find_medium, is_remote
 from storage.store import MARKER

@@ -7,7 +7,8 @@ import time
 from typing import Any
 
 from flows.command import EXIT_OF_STATUS, print_json, say
-from flows.command.scene_options import add_scene_options, open_store, scene_request
+from flows.command.scene_options import add_scene_options, scene_request
+from flows.command.store_option import open_store
 from flows.scene_run import SceneResult, is_finished, plan_scene, run_scene
 from storage import Store
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 
 from flows.command import EXIT_OK, print_json
-from flows.command.scene_options import add_scene_options, open_store, scene_request
+from flows.command.scene_options import add_scene_options, scene_request
+from flows.command.store_option import open_store
 from flows.scene_run import is_finished, plan_scene
 
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 
-from flows.cache_folder import cache_folder
 from flows.command import say
 from flows.preset import read_preset
 from flows.scene_request import SceneOptions, read_scene
@@ -14,8 +12,6 @@ from flows.scene_run import SceneRequest
 from flows.wrong_use import WrongUse
 from garden_models.scene import Target
 from garden_models.targets.boxes import parse_boxes
-from storage import Store
-from storage.address import is_remote
 
 SCENES = "scenes"
 
@@ -74,17 +70,6 @@ def scene_request(options: argparse.Namespace) -> SceneRequest:
     for remark in request.remarks:
         say(f"note: {remark}")
     return request
-
-
-def open_store(options: argparse.Namespace, create: bool = True) -> Store:
-    """Open the store that ``--store``, ``$GARDEN_STORE`` or the cache folder names."""
-    return Store.open(store_address(options.store), create=create)
-
-
-def store_address(given: str | None) -> str:
-    """Return what ``Store.open`` takes, in any process of this machine."""
-    address = given or os.environ.get("GARDEN_STORE") or str(cache_folder() / "store")
-    return address if is_remote(address) else str(Path(address).expanduser().absolute())
 
 
 def _targets(options: argparse.Namespace) -> Path | tuple[Target, ...] | None:

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from flows.command import EXIT_OK, print_json
-from flows.command.scene_options import open_store
+from flows.command.store_option import open_store
 from flows.wrong_use import WrongUse
 from storage import ActionRecord, Store
 from tasks.step.files import counted, listed, split_files
@@ -53,15 +53,18 @@ def _lines(entry: dict[str, Any]) -> list[str]:
         "files": f"{counted(names)}: {listed(names)}" if names else "",
         "config": ", ".join(f"{name} {value!r}" for name, value in settings.items()),
         "key": entry["key"],
+        "kept": "no: collected, and made again when it is needed" if entry["collected"] else "",
     }
-    return [f"{word:<8}{text}" for word, text in told.items() if text] + entry["reasons"]
+    unknown = [
+        f"input   {name} {content[:15]}: not made by a step, or no longer known"
+        for name, content in entry["unknown_inputs"].items()
+    ]
+    return [f"{word:<8}{text}" for word, text in told.items() if text] + entry["reasons"] + unknown
 
 
 def _chain(record: ActionRecord, store: Store) -> list[dict[str, Any]]:
     """Return the record and everything it was made from, nearest first, each once."""
-    makers = {
-        output.content: maker for maker in store.actions() for output in maker.outputs.values()
-    }
+    makers = _Makers(store)
     chain: list[dict[str, Any]] = []
     seen: set[str] = set()
 
@@ -69,13 +72,43 @@ def _chain(record: ActionRecord, store: Store) -> list[dict[str, Any]]:
         if current.key in seen:
             return
         seen.add(current.key)
-        chain.append(_entry(current, depth))
-        for content in current.parts["inputs"].values():
-            if content in makers:
-                follow(makers[content], depth + 1)
+        inputs = current.parts["inputs"]
+        made_by = {name: makers.of(content, current.scene) for name, content in inputs.items()}
+        entry = _entry(current, depth)
+        entry["collected"] = store.action(current.key) is None
+        entry["unknown_inputs"] = {
+            name: inputs[name] for name, maker in made_by.items() if maker is None
+        }
+        chain.append(entry)
+        for maker in made_by.values():
+            if maker is not None:
+                follow(maker, depth + 1)
 
     follow(record, 0)
     return chain
+
+
+class _Makers:
+    """Find the action that gave a content, also if it was collected since."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._keys = store.makers()
+        self._remembered: dict[str, dict[str, ActionRecord]] = {}
+
+    def of(self, content: str, scene: str) -> ActionRecord | None:
+        key = self._keys.get(content)
+        record = None if key is None else self._store.action(key)
+        return record or self._collected(scene).get(content)
+
+    def _collected(self, scene: str) -> dict[str, ActionRecord]:
+        if scene not in self._remembered:
+            self._remembered[scene] = {
+                output.content: record
+                for record in self._store.remembered(scene)
+                for output in record.outputs.values()
+            }
+        return self._remembered[scene]
 
 
 def _entry(record: ActionRecord, depth: int) -> dict[str, Any]:

@@ -9,7 +9,8 @@ from typing import Any, NoReturn
 from prefect import flow
 from prefect.states import State
 
-from flows.command.scene_options import add_scene_options, scene_request, store_address
+from flows.command.scene_options import add_scene_options, scene_request
+from flows.command.store_option import store_address
 from flows.deployed.verdict_state import verdict_state
 from flows.package.write import refresh_report, write_scene_package
 from flows.scene_run import is_finished, plan_scene, run_scene

@@ -165,6 +165,8 @@ def _room(call: Call) -> AbstractContextManager[Held]:
 
 def _make(call: Call, parts: KeyParts, why: Why, waited: float, gpus: tuple[str, ...]) -> Ref:
     context, step = call.context, call.step
+    context.protect()
+    context.store.make_room()
     context.emit(_event(call, "started", why=why))
     started = time.time()
     done, attempt = _with_retries(call, gpus)
@@ -297,7 +299,10 @@ def _why(call: Call, parts: KeyParts, reason: str, forced: bool) -> Why:
         return Why("corrupt", "its stored result was damaged")
     if reason == "evicted":
         return Why("evicted", "its result is no longer in the store")
-    last = call.context.store.latest(call.context.scene, call.step.name, call.label)
+    store, place = call.context.store, (call.context.scene, call.step.name, call.label)
+    last = store.latest(*place)
+    if last is None and store.has_run(*place):
+        return Why("evicted", "its earlier result is no longer in the store")
     return explain(parts, None if last is None else last.parts)
 
 

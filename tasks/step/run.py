@@ -15,12 +15,14 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Literal, TypeVar
 
-from storage import Store
+from storage import Store, StoreError
 from tasks.step.budget import Budget
 from tasks.step.ref import PendingValue, PlanEntry, Ref, StepEvent
 
 Engine = Literal["prefect", "local", "plan"]
 T = TypeVar("T")
+
+PROTECTED_S = 24 * 3600.0  # by then its oldest results are held by their age no more
 
 
 def ignore_event(event: StepEvent) -> None:
@@ -51,6 +53,7 @@ class RunContext:
     cancelled: threading.Event = field(default_factory=threading.Event)
     producers: dict[str, Callable[[str], Ref]] = field(default_factory=dict)
     _guard: threading.RLock = field(default_factory=threading.RLock)
+    _pin: str = ""
 
     def emit(self, event: StepEvent) -> None:
         """Pass an event on, one at a time."""
@@ -63,6 +66,28 @@ class RunContext:
         """Note what a run would do with a step."""
         with self._guard:
             self.plan.append(entry)
+
+    def protect(self) -> None:
+        """Hold the scene's results against collection while the run, or its process, lives.
+
+        A store that takes no pin is one from which this machine's collectors take nothing.
+        """
+        with self._guard:
+            if self._pin:
+                return
+            self._pin = f"run-{self.run_id}"
+        with contextlib.suppress(StoreError, OSError):
+            self.store.pin(
+                self._pin, scenes=[self.scene], reason="a run in progress", for_s=PROTECTED_S
+            )
+
+    def unprotect(self) -> None:
+        """Let go of what ``protect`` held."""
+        with self._guard:
+            pin, self._pin = self._pin, ""
+        with contextlib.suppress(StoreError, OSError):
+            if pin:
+                self.store.unpin(pin)
 
     def is_forced(self, step: str, name: str) -> bool:
         """Tell whether the user asked for this step to run again."""
@@ -99,6 +124,7 @@ def run_context(context: RunContext) -> Iterator[RunContext]:
         raise
     finally:
         _current.reset(token)
+        context.unprotect()
 
 
 @contextmanager

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from flows.command import main
-from flows.command.scene_options import store_address
+from flows.command.store_option import store_address
 from storage import Store
 from tests.s3_server import BUCKET, ENVIRONMENT, S3Server
 from tests.storage.test_store import record_of

@@ -85,7 +85,13 @@ def test_single_flight_two_threads_one_execution(store: Store) -> None:
 
 
 def test_fail_loud_a_full_disk_fails_the_step(store: Store) -> None:
-    with disk(FaultyOs(8, "error", errno.ENOSPC)), pytest.raises(StepFailed) as caught:
+    class Full(FaultyOs):
+        def write(self, path: Path, data: object) -> None:
+            if path.name == "zarr.json":
+                raise OSError(errno.ENOSPC, "No space left on device")
+            super().write(path, data)
+
+    with disk(Full()), pytest.raises(StepFailed) as caught:
         in_run(store, chain)
     assert caught.value.kind == "StoreFull"
     assert "free space there" in caught.value.reason
