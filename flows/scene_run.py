@@ -10,6 +10,7 @@ from typing import Literal
 
 from flows.factorize import SceneRefs, factorize_scene
 from flows.preset import Preset
+from flows.step_runner import AT_ONCE_ELSEWHERE, Elsewhere
 from garden_models.scene import Target
 from storage import Store
 from storage.formats.package import check_writable, package_source
@@ -65,20 +66,23 @@ def run_scene(
     events: Callable[[StepEvent], None],
     engine: Literal["prefect", "local"] = "prefect",
     budget: Budget | None = None,
+    elsewhere: Elsewhere = None,
 ) -> SceneResult:
     """Execute the scene's flow with Prefect (or ``local``, in this process without it).
 
-    Steps start when the ``budget`` (of the whole machine if not given) has room for them.
+    Steps start when the ``budget`` (of the whole machine if not given) has room for them;
+    ``elsewhere`` computes them on other machines (``flows.step_runner``).
 
     A scene that fails comes back with ``refs.failure`` set and all that was computed.
     """
     check_writable(request.package)
     budget = budget or Budget.of_machine()
     if engine == "local":
-        return _run(request, _context(request, store, "local", events, budget))
+        return _run(request, _context(request, store, "local", events, budget, elsewhere))
     from flows.prefect_flow import PrefectProgress, scene_flow
 
-    context = _context(request, store, "prefect", PrefectProgress(events), budget)
+    progress = PrefectProgress(events)
+    context = _context(request, store, "prefect", progress, budget, elsewhere)
     result: SceneResult = scene_flow(request.name)(_run)(request, context)
     return result
 
@@ -89,6 +93,7 @@ def _context(
     engine: Literal["prefect", "local"],
     events: Callable[[StepEvent], None],
     budget: Budget,
+    elsewhere: Elsewhere,
 ) -> RunContext:
     return RunContext(
         store=store,
@@ -96,8 +101,9 @@ def _context(
         engine=engine,
         events=events,
         force=request.force,
-        workers=max(2, len(budget.cores)),
+        workers=max(2, len(budget.cores)) if elsewhere is None else AT_ONCE_ELSEWHERE,
         budget=budget,
+        elsewhere=elsewhere,
     )
 
 

@@ -43,7 +43,11 @@ class CaptureSource:
     cameras: tuple[SourceFile, ...] = ()
 
 
-@step(version=1, packages=("pillow", "pillow-heif", "opencv-python-headless", "numpy", "pycolmap"))
+@step(
+    version=1,
+    packages=("pillow", "pillow-heif", "opencv-python-headless", "numpy", "pycolmap"),
+    here=True,
+)
 def ingest(source: CaptureSource, config: Ingest, progress: Progress = silent) -> Capture:
     """Return the photos, and their cameras if files of cameras were given."""
     from storage.formats.cameras import read_cameras

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
+from flows.step_runner import Elsewhere
 from storage import Store
 from tasks.step import Budget, StepEvent
 
@@ -16,11 +17,12 @@ Report = dict[str, Any]
 
 @dataclass(frozen=True)
 class JobRun:
-    """What a job is run with: call it with every step's event; hand on engine and budget."""
+    """What a job is run with: call it with every step's event; hand the rest on."""
 
     listener: Callable[[StepEvent], None]
     engine: Literal["prefect", "local"]
     budget: Budget
+    elsewhere: Elsewhere = None
 
     def __call__(self, event: StepEvent) -> None:
         """Take one event, from any thread."""

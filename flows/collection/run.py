@@ -27,6 +27,7 @@ from flows.collection.state import (
 from flows.collection.stopping import stop_on_terminate
 from flows.collection.worker import WorkerSetting, failure_reason
 from flows.collection.worker_process import GRACE_S, WorkerProcess
+from flows.step_runner import HERE, Runner
 from flows.wrong_use import WrongUse
 from storage import Store
 from storage.owner import Owner
@@ -64,6 +65,7 @@ class Options:
     only: tuple[str, ...] = ()
     keep_going: bool = True
     budget: Budget | None = None
+    runner: Runner = HERE
 
 
 def tell_nobody(event: RowEvent) -> None:
@@ -79,6 +81,7 @@ def run_collection(
     only: Sequence[str] = (),
     keep_going: bool = True,
     budget: Budget | None = None,
+    runner: Runner = HERE,
     on_event: Callable[[RowEvent], None] = tell_nobody,
 ) -> CollectionResult:
     """Run all scenes of a collection that are not finished; return what came of all.
@@ -94,6 +97,7 @@ def run_collection(
         only: names of scenes, or ``failed`` for those of ``failed.json``.
         keep_going: whether a scene that failed leaves the others alone.
         budget: what all steps together may use; the machine if not given.
+        runner: who computes the steps; this machine if not given.
         on_event: called in this thread whenever a scene's row changed.
 
     Raises:
@@ -101,7 +105,7 @@ def run_collection(
         KeyboardInterrupt: stopped by Ctrl-C or SIGTERM; the state says so.
     """
     orders = [scene_order(request) for request in collection.scenes]
-    options = Options(engine, scenes_at_once, tuple(only), keep_going, budget)
+    options = Options(engine, scenes_at_once, tuple(only), keep_going, budget, runner)
     return run_jobs(collection, orders, store_address, options, on_event)
 
 
@@ -286,6 +290,8 @@ class _Runner:
                 store=self._state.store,
                 engine=self._options.engine,
                 budget=self._budget.to_json(),
+                runner=self._options.runner.name,
+                shared_store=self._options.runner.shared_store,
                 collection=self._state.name,
                 path=sys.path,
             )

@@ -42,7 +42,9 @@ class SceneJob:
         """Factorize the scene; one that fails has a package too, of what was computed."""
         from flows.package.write import write_scene_package
 
-        result = run_scene(self.request, store, events, events.engine, events.budget)
+        result = run_scene(
+            self.request, store, events, events.engine, events.budget, events.elsewhere
+        )
         return scene_report(write_scene_package(result, store), self.request.package)
 
 

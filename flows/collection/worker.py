@@ -12,7 +12,7 @@ import json
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,8 @@ class WorkerSetting:
     store: str
     engine: str
     budget: dict[str, Any]
+    runner: str | None
+    shared_store: bool
     collection: str
     path: list[str]
 
@@ -38,15 +40,17 @@ def main() -> None:
     answers = Answers(descriptor)
     setting = WorkerSetting(**json.loads(sys.stdin.readline()))
     sys.path[:] = setting.path
-    work = _Work(setting, answers)
-    for line in sys.stdin:
-        answers.send(work.obey(json.loads(line)))
+    with ExitStack() as stack:
+        work = _Work(setting, answers, stack)
+        for line in sys.stdin:
+            answers.send(work.obey(json.loads(line)))
 
 
 class _Work:
-    """The store and the budget, opened once for all jobs."""
+    """The store, the budget and the runner, opened once for all jobs."""
 
-    def __init__(self, setting: WorkerSetting, answers: Answers) -> None:
+    def __init__(self, setting: WorkerSetting, answers: Answers, stack: ExitStack) -> None:
+        from flows.step_runner import step_runner
         from storage import Store
         from tasks.step import Budget
 
@@ -54,6 +58,9 @@ class _Work:
         self._answers = answers
         self._store = Store.open(setting.store)
         self._budget = Budget.from_json(setting.budget)
+        self._elsewhere = stack.enter_context(
+            step_runner(setting.runner, self._store, shared=setting.shared_store)
+        )
         if len(self._budget.cores) < (os.cpu_count() or 1):
             self._budget.confine()
 
@@ -65,7 +72,8 @@ class _Work:
         try:
             job = JobOrder(**order).make()
             with _tagged(self._setting):
-                report = job.run(self._store, JobRun(self._tell, engine, self._budget))
+                events = JobRun(self._tell, engine, self._budget, self._elsewhere)
+                report = job.run(self._store, events)
         except Exception as error:  # noqa: BLE001 - whatever it is, it is this scene's alone
             return {"failed": failure_reason(error)}
         return {"done": report}

@@ -12,6 +12,7 @@ from flows.collection.state import PAGE, read_state
 from flows.command import EXIT_FAILED, EXIT_OF_STATUS, EXIT_OK, print_json, say
 from flows.command.store_option import open_store, store_address
 from flows.preset import read_preset
+from flows.step_runner import Runner, add_runner_options, step_runner
 from storage import Store
 from tasks.step import Budget
 
@@ -76,6 +77,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         default="prefect",
         help="prefect (default: every scene is a flow run) or local",
     )
+    add_runner_options(parser)
     parser.add_argument(
         "--scenes-at-once", type=int, metavar="N", help="worker processes (default: one a core)"
     )
@@ -125,10 +127,13 @@ def _plan(options: argparse.Namespace, collection: Collection, store: Store) -> 
 def _run(options: argparse.Namespace, collection: Collection) -> int:
     from flows.collection.terminal_view import BatchView
 
-    with BatchView(collection.out) as view:
+    address = store_address(options.store)
+    usable = step_runner(options.runner, Store.open(address), shared=options.shared_store)
+    with usable, BatchView(collection.out) as view:
         result = run_collection(
             collection,
-            store_address(options.store),
+            address,
+            runner=Runner(options.runner, options.shared_store),
             engine=options.engine,
             scenes_at_once=options.scenes_at_once,
             only=options.only,

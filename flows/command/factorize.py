@@ -10,6 +10,7 @@ from flows.command import EXIT_OF_STATUS, print_json, say
 from flows.command.scene_options import add_scene_options, scene_request
 from flows.command.store_option import open_store
 from flows.scene_run import SceneResult, is_finished, plan_scene, run_scene
+from flows.step_runner import add_runner_options, step_runner
 from storage import Store
 
 DESCRIPTION = """\
@@ -22,6 +23,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.description = DESCRIPTION
     add_scene_options(parser)
+    add_runner_options(parser)
     parser.add_argument(
         "--engine",
         choices=("prefect", "local"),
@@ -51,8 +53,12 @@ def run(options: argparse.Namespace) -> int:
 def _execute(options: argparse.Namespace, planned: SceneResult, store: Store) -> SceneResult:
     from flows.terminal_view import TerminalView
 
-    with TerminalView(f"garden factorize {planned.request.name}") as view:
-        return run_scene(planned.request, store, view, options.engine)
+    title = f"garden factorize {planned.request.name}"
+    with (
+        step_runner(options.runner, store, shared=options.shared_store) as elsewhere,
+        TerminalView(title) as view,
+    ):
+        return run_scene(planned.request, store, view, options.engine, elsewhere=elsewhere)
 
 
 def _write_report(result: SceneResult, store: Store) -> dict[str, Any]:

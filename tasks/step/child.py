@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
-import importlib
 import json
 import os
 import signal
@@ -64,31 +63,12 @@ def main() -> None:
 def obey(order: dict[str, Any], answers: Answers) -> dict[str, Any]:
     """Compute and publish; return the parts of ``Done`` as JSON."""
     sys.path[:] = order["path"]
-    from storage import Store
-    from tasks.step import Step
     from tasks.step.compute import compute
-    from tasks.step.inputs import Arguments
+    from tasks.step.order import open_store, read_order
     from tasks.step.run import RunContext, run_context
-    from tasks.step.wire import plain_from_json, refs_from_json
 
-    step: Any = importlib.import_module(order["module"])
-    for name in order["name"].split("."):
-        step = getattr(step, name)
-    if not isinstance(step, Step):
-        raise TypeError(f"{order['module']}.{order['name']} is no step")
-    if step.code().digest != order["code"]:
-        raise RuntimeError("the code was changed while the run was going on: start it again")
-    hints = step.hints()
-    arguments = Arguments(
-        {name: refs_from_json(document) for name, document in order["refs"].items()},
-        {name: plain_from_json(d, hints.get(name, object)) for name, d in order["plain"].items()},
-    )
-    store = Store.open(
-        order["store"],
-        create=False,
-        durability=order["durability"],
-        verify=order["verify"],
-    )
+    step, arguments = read_order(order)
+    store = open_store(order)
     context = RunContext(store, order["scene"], run_id=order["run_id"], isolate=False)
     with run_context(context):
         done = compute(context, step, arguments, answers.progress)

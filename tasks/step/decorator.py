@@ -44,6 +44,7 @@ class StepSpec:
     time_limit_s: float | None = None
     memory_limit_gb: float | None = None
     need: Need = ONE_CORE
+    here: bool = False
 
 
 class Step:
@@ -160,6 +161,7 @@ def step(
     cores: int | Literal["all"] = 1,
     memory_gb: float = 1.0,
     gpus: int = 0,
+    here: bool = False,
 ) -> Callable[[Callable[..., Any]], Step]:
     """Make a step of a function.
 
@@ -180,6 +182,8 @@ def step(
         cores: how many cores it keeps busy; ``all`` for a step that takes what there is.
         memory_gb: resident memory that it needs at its peak, by measurement.
         gpus: how many GPUs it needs for itself.
+        here: compute where the run was started, never on another machine: the step reads
+            the user's files.
 
     A run with a budget starts the step when its cores, memory and GPUs are free.
     """
@@ -201,6 +205,7 @@ def step(
             time_limit_s=time_limit_s,
             memory_limit_gb=memory_limit_gb,
             need=Need(cores, memory_gb, gpus),
+            here=here,
         )
         return Step(fn, spec)
 

@@ -132,6 +132,10 @@ def execute(call: Call, lost: str = "") -> Ref:
         if record is not None:
             return _hit(call, record, Seconds())
         why = _why(call, parts, lost or reason, forced)
+        if context.elsewhere is not None and not step.spec.here:
+            ref = context.elsewhere(call)
+            _remember_producer(call, ref)
+            return ref
         with _single_flight(call, parts.key, forced) as found:
             waited = time.monotonic() - started
             if found is not None:

@@ -27,9 +27,9 @@ from storage.redact import redact
 from tasks.step.compute import Done
 from tasks.step.inputs import Arguments
 from tasks.step.memory import Peak, session_rss
+from tasks.step.order import write_order
 from tasks.step.ref import Cancelled, MemoryLimit, Seconds, StepCrashed, TimeLimit
 from tasks.step.run import RunContext
-from tasks.step.wire import plain_to_json, refs_to_json
 
 if TYPE_CHECKING:
     from tasks.step import Step
@@ -67,7 +67,7 @@ def compute_isolated(
         Cancelled: the run was stopped.
         BadInput, BadGeometry, MemoryError, OSError, StoreError: as raised in the child.
     """
-    order = _order(context, step, arguments, label)
+    order = write_order(context, step, arguments, label) | {"path": sys.path}
     with context.store.scratch() as folder, _child(folder, order, gpus) as child:
         answer = _listen(context, step, child, report)
     if "error" in answer:
@@ -79,23 +79,6 @@ def compute_isolated(
         Seconds(**done["seconds"]),
         max(child.peak.mb, done["peak_mb"]),
     )
-
-
-def _order(context: RunContext, step: Step, arguments: Arguments, label: str) -> dict[str, Any]:
-    return {
-        "module": step.fn.__module__,
-        "name": step.fn.__qualname__,
-        "label": label,
-        "code": step.code().digest,
-        "store": context.store.address,
-        "durability": "full" if context.store.durable else "none",
-        "verify": context.store.verify_level,
-        "scene": context.scene,
-        "run_id": context.run_id,
-        "plain": {name: plain_to_json(value) for name, value in arguments.plain.items()},
-        "refs": {name: refs_to_json(value) for name, value in arguments.refs.items()},
-        "path": sys.path,
-    }
 
 
 @dataclass

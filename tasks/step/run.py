@@ -36,7 +36,8 @@ class RunContext:
     ``force`` names steps (``segment`` or ``segment[bulldozer]``, ``*`` for all) that run
     even on a hit. ``workers`` bounds the steps that the local engine runs at once.
     ``isolate=False`` runs isolated steps in this process (for tests). Without ``budget``
-    steps wait for nobody. ``outcomes`` and ``plan`` are filled as steps finish.
+    steps wait for nobody. ``elsewhere`` computes calls that are not in the store on other
+    machines (``tasks.step.dask_runner``). ``outcomes`` and ``plan`` are filled as steps finish.
     """
 
     store: Store
@@ -51,6 +52,7 @@ class RunContext:
     outcomes: list[StepEvent] = field(default_factory=list)
     plan: list[PlanEntry] = field(default_factory=list)
     cancelled: threading.Event = field(default_factory=threading.Event)
+    elsewhere: Callable[[Any], Ref] | None = None
     producers: dict[str, Callable[[str], Ref]] = field(default_factory=dict)
     _guard: threading.RLock = field(default_factory=threading.RLock)
     _pin: str = ""

@@ -1,13 +1,14 @@
-"""Write the arguments of an isolated step as JSON, and read them in the child."""
+"""Write the arguments and events of a step as JSON, and read them in another process."""
 
 from __future__ import annotations
 
 import base64
+import dataclasses
 from typing import Any
 
 from storage.canonical import dtype_name, is_array, little_endian
 from storage.codec.tree import decode, encode
-from tasks.step.ref import Ref
+from tasks.step.ref import Ref, Seconds, StepEvent, Why
 
 Json = Any
 
@@ -41,6 +42,21 @@ def refs_from_json(document: Json) -> Any:
     if isinstance(document, list):
         return tuple(refs_from_json(item) for item in document)
     return None if document is None else Ref.from_json(document["ref"])
+
+
+def event_to_json(event: StepEvent) -> Json:
+    """Return an event as JSON."""
+    return dataclasses.asdict(event)
+
+
+def event_from_json(document: Json) -> StepEvent:
+    """Return what ``event_to_json`` was given."""
+    values = dict(document)
+    values["reasons"] = tuple(values["reasons"])
+    values["seconds"] = Seconds(**values["seconds"])
+    values["why"] = None if values["why"] is None else Why(**values["why"])
+    values["ref"] = None if values["ref"] is None else Ref.from_json(values["ref"])
+    return StepEvent(**values)
 
 
 def _leaf_to_json(leaf: Any) -> Json:
