@@ -8,6 +8,7 @@ manifest are no object; ``sweep`` removes them when they are a day old.
 from __future__ import annotations
 
 import errno
+import os
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -27,6 +28,7 @@ from storage.leases import LEASE_S
 from storage.manifest import MANIFEST
 from storage.medium import Level
 from storage.members import MemberWriter
+from storage.read_cache import ReadCache
 
 _REQUESTS_AT_ONCE = 8
 _UNFINISHED_FOR_S = 24 * 3600.0  # then members without a manifest are taken for abandoned
@@ -47,6 +49,7 @@ class BucketMedium:
         self._bucket = BucketClient(address)
         self.leases = BucketLeases(self._bucket, lease_s)
         self._touched: dict[str, float] = {}
+        self.cache = ReadCache.of(os.environ)
 
     def prepare(self) -> None:
         """Check that there is a bucket, and nothing but a store in the place.
@@ -129,6 +132,7 @@ class BucketMedium:
         created = self._bucket.create(place + MANIFEST, manifest) is not None
         for _try in range(_SEALING_TRIES):
             if not (lost := self._lost(staged, digest)):
+                self._keep_here(staged)
                 return created
             self._upload(staged, place, lost)  # removed as abandoned just before the manifest came
         raise OSError(errno.EIO, f"members of {digest[:15]} in {self.address} keep being removed")
@@ -139,6 +143,11 @@ class BucketMedium:
 
         with ThreadPoolExecutor(_REQUESTS_AT_ONCE, "upload") as pool:
             list(pool.map(put, paths))
+
+    def _keep_here(self, staged: MemberWriter) -> None:
+        if self.cache is not None:
+            for path, member in staged.members.items():
+                self.cache.adopt(member.digest, staged.folder / path)
 
     def _lost(self, staged: MemberWriter, digest: str) -> list[str]:
         present = self.members(digest)

@@ -19,6 +19,7 @@ from storage.leases import LEASE_S
 from storage.manifest import MANIFEST
 from storage.medium import Level
 from storage.members import MemberWriter
+from storage.read_cache import ReadCache
 
 _YOUNG_S = 3600.0
 _LISTED = re.compile(r"[^/]{2}(?!\.\.?$)[^/\0]+")
@@ -29,6 +30,7 @@ class FolderMedium:
 
     recheck: Level = "full"
     readers = 1
+    cache: ReadCache | None = None
 
     def __init__(self, path: Path, *, durable: bool = True, lease_s: float = LEASE_S) -> None:
         self.path = path

@@ -15,6 +15,7 @@ from typing import Literal, Protocol
 from storage.errors import StoreError
 from storage.leases import LeaseTable
 from storage.members import MemberWriter
+from storage.read_cache import ReadCache
 
 Level = Literal["manifest", "full"]
 
@@ -31,6 +32,9 @@ class Medium(Protocol):
 
     readers: int
     """How many members are best read at once; 1 where reading one already takes all there is."""
+
+    cache: ReadCache | None
+    """What keeps members on this machine, where the medium is not on it."""
 
     def prepare(self) -> None:
         """Make the place for a new store.

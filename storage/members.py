@@ -87,12 +87,25 @@ class MemberReader:
             raise CorruptArtifact(self.digest, f"{path} is no member")
         if path in self._ahead:
             return self._ahead[path] if member.size < _SMALL else self._ahead.pop(path)
-        data = self._read(path, 0, None)
-        if len(data) != member.size or digest_bytes(data) != member.digest:
-            raise CorruptArtifact(self.digest, f"member {path} has changed")
+        data = self._cached(member)
+        if data is None:
+            data = self._read(path, 0, None)
+            if not _is(member, data):
+                raise CorruptArtifact(self.digest, f"member {path} has changed")
+            if self._medium.cache is not None:
+                self._medium.cache.put(member.digest, data)
         self._hashed.add(path)
         if self.readers > 1 and member.size < _SMALL:
             self._ahead[path] = data
+        return data
+
+    def _cached(self, member: Member) -> bytes | None:
+        """Return a member that is kept on this machine, hashed as if it came from afar."""
+        cache = self._medium.cache
+        data = None if cache is None else cache.get(member.digest)
+        if cache is not None and data is not None and not _is(member, data):
+            cache.drop(member.digest)
+            return None
         return data
 
     def check_rest(self) -> None:
@@ -126,3 +139,7 @@ class MemberReader:
             raise
         except OSError as error:
             raise CorruptArtifact(self.digest, f"member {path} cannot be read") from error
+
+
+def _is(member: Member, data: bytes) -> bool:
+    return len(data) == member.size and digest_bytes(data) == member.digest

@@ -168,7 +168,7 @@ class DaskRunner:
                 f"the Dask scheduler {self.address} has no workers: start some with"
                 f" `dask worker {self.address}`"
             ) from None
-        except Exception as error:  # noqa: BLE001 - Dask raises errors of many kinds
+        except Exception as error:
             raise RunnerError(
                 f"the Dask workers of {self.address} cannot run garden: install the same version"
                 f" there, or set PYTHONPATH ({type(error).__name__}: {error})"
