@@ -25,12 +25,14 @@ from flows.benchmark.orchestration.pipeline import CHAINS, Chain, Signal, first_
 from flows.benchmark.orchestration.step_cost import HITS_A_REPEAT, WrongResult, measure_steps
 
 HERE = tuple(peer for peer in PEERS if not peer.on_server)
+QUICK = tuple(peer for peer in HERE if peer.package != "redun")  # which migrates a database
 SHORT = tuple(replace(chain, length=10) for chain in CHAINS.values())
 
 
-def test_every_peer_misses_once_and_then_hits(tmp_path: Path) -> None:
-    costs = measure_steps(SHORT, tmp_path, repeats=2, peers=HERE)
-    assert [(c.chain, c.peer) for c in costs] == [(c.name, p.name) for c in SHORT for p in HERE]
+@pytest.mark.parametrize("peers", [QUICK, pytest.param(HERE, marks=pytest.mark.slow)])
+def test_every_peer_misses_once_and_then_hits(tmp_path: Path, peers: tuple[Peer, ...]) -> None:
+    costs = measure_steps(SHORT, tmp_path, repeats=2, peers=peers)
+    assert [(c.chain, c.peer) for c in costs] == [(c.name, p.name) for c in SHORT for p in peers]
     for cost in costs:
         assert len(cost.misses_ms) == 2
         assert len(cost.hits_ms) == 2 * HITS_A_REPEAT
