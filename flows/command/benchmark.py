@@ -76,6 +76,7 @@ def _sample(options: argparse.Namespace, store: Store) -> int:
 def _orchestration(options: argparse.Namespace, store: Store) -> int:
     from flows.benchmark.orchestration.measure_all import measure_all
     from flows.benchmark.orchestration.peers.all_peers import PeerMissing
+    from flows.benchmark.orchestration.scale import SceneNotOk
     from flows.benchmark.orchestration.scene_overhead import SceneFailed
     from flows.benchmark.orchestration.step_cost import WrongResult
 
@@ -83,7 +84,7 @@ def _orchestration(options: argparse.Namespace, store: Store) -> int:
     try:
         with store.scratch() as folder:
             report = measure_all(asked, folder, say)
-    except (PeerMissing, WrongResult, SceneFailed) as error:
+    except (PeerMissing, WrongResult, SceneFailed, SceneNotOk) as error:
         say(f"garden: {error}")
         return EXIT_FAILED
     if asked.out is not None:

@@ -24,7 +24,8 @@ Say = Callable[[str], None]
 def measure_all(options: OrchestrationOptions, folder: Path, say: Say) -> BenchmarkReport:
     """Return the report; everything that is written meanwhile lies below ``folder``.
 
-    Raises PeerMissing before anything is measured, WrongResult, SceneFailed.
+    Raises PeerMissing before anything is measured, WrongResult, SceneFailed,
+    SceneNotOk.
     """
     if "steps" in options.parts:
         check_installed(PEERS)
@@ -61,10 +62,22 @@ def _scene(options: OrchestrationOptions, folder: Path, say: Say) -> list[Sectio
     return [scene_section(measure_scene(options.scene, folder))]
 
 
+def _scale(options: OrchestrationOptions, folder: Path, say: Say) -> list[Section]:
+    from flows.benchmark.orchestration.scale import ScaleOptions, measure_scale
+    from flows.benchmark.orchestration.scale_report import scale_sections
+
+    say(f"{options.scenes} simulated scenes of {options.objects} objects ({options.engine})")
+    scale = ScaleOptions(
+        options.scenes, options.objects, options.engine, options.processes, options.server
+    )
+    return scale_sections(measure_scale(scale, folder, say))
+
+
 _MEASURE: dict[str, Callable[[OrchestrationOptions, Path, Say], list[Section]]] = {
     "steps": _steps,
     "publishing": _publishing,
     "scene": _scene,
+    "scale": _scale,
 }
 
 

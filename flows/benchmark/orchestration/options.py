@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-PARTS = ("steps", "publishing", "scene")
+PARTS = ("steps", "publishing", "scene", "scale")
 SAMPLE = Path("tests/scenes/corner")
 
 
@@ -24,6 +24,7 @@ class OrchestrationOptions:
     objects: int = 5
     engine: Literal["local", "prefect"] = "prefect"
     processes: int = 2
+    server: Literal["full", "lean"] = "lean"
     out: Path | None = None
 
 
@@ -54,6 +55,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--processes", type=int, default=default.processes, help="simulated scenes at once (2)"
     )
     group.add_argument(
+        "--server",
+        choices=("lean", "full"),
+        default=default.server,
+        help="the Prefect server's settings for the simulated scenes: lean keeps no events",
+    )
+    group.add_argument(
         "--out", type=Path, metavar="FOLDER", help="write orchestration.md and .json here"
     )
 
@@ -70,5 +77,6 @@ def from_arguments(arguments: argparse.Namespace) -> OrchestrationOptions:
         objects=arguments.objects,
         engine=arguments.engine,
         processes=arguments.processes,
+        server=arguments.server,
         out=arguments.out,
     )

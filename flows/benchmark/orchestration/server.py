@@ -16,7 +16,19 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from flows.benchmark.orchestration.process_group import Usage, group_usage
+from flows.benchmark.orchestration.process_usage import Usage, group_usage
+
+SERVER_PROFILES: dict[str, dict[str, str]] = {
+    "full": {},
+    "lean": {
+        "PREFECT_SERVER_SERVICES_EVENT_PERSISTER_ENABLED": "false",
+        "PREFECT_SERVER_SERVICES_TRIGGERS_ENABLED": "false",
+        "PREFECT_SERVER_UI_ENABLED": "false",
+    },
+}
+"""Settings of a server. ``lean`` keeps no events and runs no automations (so that runs of
+killed processes are not marked); flow runs and task runs are recorded as ever.
+"""
 
 STARTS_WITHIN_S = 120.0
 STOPS_WITHIN_S = 15.0

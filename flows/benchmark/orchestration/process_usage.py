@@ -1,9 +1,8 @@
-"""Read what the processes of one group use, from Linux's /proc."""
+"""Read what processes use, from Linux's /proc: one, a group, or all that one started."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,12 +21,21 @@ class Usage:
 
 def group_usage(group: int) -> Usage:
     """Return what the live processes of the group use (and the dead ones they waited for)."""
-    return _total([fields for fields in _processes() if int(fields[2]) == group])
+    return _total([fields for fields in _processes().values() if int(fields[2]) == group])
 
 
 def process_usage(pid: int) -> Usage:
     """Return what one process uses."""
     return _total([fields for fields in (_fields(pid),) if fields is not None])
+
+
+def children_usage(pid: int, without_group: int | None = None) -> Usage:
+    """Return what the live processes use that a process started, and those that they did."""
+    processes = _processes()
+    below = {pid}
+    while more := {p for p, f in processes.items() if int(f[1]) in below and p not in below}:
+        below |= more
+    return _total([processes[p] for p in below - {pid} if int(processes[p][2]) != without_group])
 
 
 def _total(processes: list[list[str]]) -> Usage:
@@ -36,10 +44,9 @@ def _total(processes: list[list[str]]) -> Usage:
     return Usage(ticks * _TICK_S, pages * _PAGE, len(processes))
 
 
-def _processes() -> Iterator[list[str]]:
-    for entry in os.scandir("/proc"):
-        if entry.name.isdigit() and (fields := _fields(int(entry.name))) is not None:
-            yield fields
+def _processes() -> dict[int, list[str]]:
+    pids = [int(entry.name) for entry in os.scandir("/proc") if entry.name.isdigit()]
+    return {pid: fields for pid in pids if (fields := _fields(pid)) is not None}
 
 
 def _fields(pid: int) -> list[str] | None:
