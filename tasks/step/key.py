@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -33,7 +34,7 @@ class KeyParts:
     weights: dict[str, str]
     seed: int
 
-    @property
+    @functools.cached_property
     def key(self) -> str:
         """The action key."""
         return digest_value(
