@@ -6,18 +6,30 @@ import argparse
 import dataclasses
 from pathlib import Path
 
+from flows.benchmark.latency.command import (
+    DEFINED,
+    add_latency_options,
+    make_report,
+    report_text,
+)
 from flows.benchmark.orchestration.options import add_options, from_arguments
 from flows.command import EXIT_FAILED, EXIT_OK, print_json, say
 from flows.command.store_option import open_store
 from storage import Store
 
-DESCRIPTION = """\
+DESCRIPTION = f"""\
   garden benchmark sample [FOLDER]       the sample capture against its exact truth, end to end
   garden benchmark depth CAPTURE ...     depth with estimated cameras, after one scale a scene,
                                          beside a plain plane sweep: error and time
   garden benchmark gravity CAPTURE ...   gravity with cameras given and with cameras estimated
   garden benchmark orchestration         what a step, a publish and a scene cost beside their
                                          peers, and a thousand simulated scenes
+  garden benchmark latency [COLLECTION|CAPTURE ...] [--run] [--repeat N] [--out FOLDER]
+                                         cold, cached and warm seconds a scene, object and step,
+                                         beside the paper's table: Parquet, Markdown, HTML
+
+latency leaves rendering, which only reports and evaluations need, out of its totals:
+{DEFINED}
 
 depth and gravity need captures with cameras.json (and depth/) as truth. Results come from
 the store where they are there. Exit code 1 if a measure of `sample` or `orchestration`
@@ -29,13 +41,28 @@ SAMPLE = Path("tests/scenes/corner")
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.description = DESCRIPTION
-    parser.add_argument("name", choices=("sample", "depth", "gravity", "orchestration"))
+    parser.add_argument("name", choices=("sample", "depth", "gravity", "orchestration", "latency"))
     parser.add_argument("captures", nargs="*", type=Path, metavar="CAPTURE")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FOLDER",
+        help="where orchestration.md and .json go (nowhere), or the latency report (latency)",
+    )
+    parser.add_argument(
+        "--engine",
+        choices=("prefect", "local"),
+        default="prefect",
+        help="what runs the scenes of orchestration and latency (prefect)",
+    )
     add_options(parser)
+    add_latency_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit code."""
+    if options.name == "latency":
+        return _latency(options)
     store = open_store(options)
     if options.name == "sample":
         return _sample(options, store)
@@ -54,6 +81,15 @@ def run(options: argparse.Namespace) -> int:
         print_json({"benchmark": options.name, "rows": rows})
     else:
         print(table(rows))
+    return EXIT_OK
+
+
+def _latency(options: argparse.Namespace) -> int:
+    document = make_report(options)
+    if options.json:
+        print_json(document)
+    else:
+        print(report_text(document))
     return EXIT_OK
 
 

@@ -29,7 +29,7 @@ class OrchestrationOptions:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options, in a group of their own."""
+    """Add the options that only orchestration takes, in a group of their own."""
     default = OrchestrationOptions()
     group = parser.add_argument_group("orchestration")
     group.add_argument(
@@ -46,12 +46,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--scenes", type=int, default=default.scenes, help="simulated scenes (1000)")
     group.add_argument("--objects", type=int, default=default.objects, help="objects a scene (5)")
     group.add_argument(
-        "--engine",
-        choices=("local", "prefect"),
-        default=default.engine,
-        help="what runs the simulated scenes",
-    )
-    group.add_argument(
         "--processes", type=int, default=default.processes, help="simulated scenes at once (2)"
     )
     group.add_argument(
@@ -59,9 +53,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         choices=("lean", "full"),
         default=default.server,
         help="the Prefect server's settings for the simulated scenes: lean keeps no events",
-    )
-    group.add_argument(
-        "--out", type=Path, metavar="FOLDER", help="write orchestration.md and .json here"
     )
 
 

@@ -1,0 +1,1 @@
+"""Latency reports: cold, cached and warm seconds per scene, object and step."""

@@ -1,0 +1,88 @@
+"""``garden benchmark latency``: its options, and what it prints."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from textwrap import fill
+from typing import Any
+
+from flows.benchmark.latency.tables import Table, ours_table, paper_table, scene_table, step_table
+from flows.benchmark.latency.timing import DEFINITIONS
+from flows.wrong_use import WrongUse
+
+Json = dict[str, Any]
+
+OUT = Path("latency")
+
+DEFINED = "\n".join(
+    fill(text, 96, initial_indent=f"  {mode:<8}", subsequent_indent=" " * 10)
+    for mode, text in DEFINITIONS.items()
+)
+
+
+def add_latency_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that only ``latency`` takes."""
+    group = parser.add_argument_group("latency")
+    how = group.add_mutually_exclusive_group()
+    how.add_argument(
+        "--read",
+        action="store_true",
+        help="read what the store knows and execute nothing (default): cold and cached",
+    )
+    how.add_argument(
+        "--run",
+        action="store_true",
+        dest="execute",
+        help="run every scene cold, cached and warm with a throw-away store in --out",
+    )
+    group.add_argument(
+        "--repeat", type=int, default=1, metavar="N", help="measure N times, for p50 and p95"
+    )
+    group.add_argument(
+        "--packages", type=Path, metavar="FOLDER", help="where the scenes' packages are (scenes)"
+    )
+    group.add_argument("--preset", help="named preset or a TOML file")
+    group.add_argument(
+        "--set", action="append", default=[], metavar="STEP.OPTION=VALUE", dest="settings"
+    )
+
+
+def make_report(options: argparse.Namespace) -> Json:
+    """Make the report that the options ask for; return it."""
+    from flows.benchmark.latency.report import LatencyOptions, write_latency_report
+    from flows.command import say
+    from flows.command.scene_options import store_address
+    from flows.preset import read_preset
+
+    if options.repeat < 1:
+        raise WrongUse(f"--repeat {options.repeat}: measure at least once")
+    out = options.out or OUT
+    preset = None
+    if options.preset or options.settings:
+        preset = read_preset(options.preset or "embedded", options.settings)
+    how = LatencyOptions(options.execute, options.repeat, options.engine, options.packages, preset)
+    document = write_latency_report(options.captures, out, store_address(options.store), how, say)
+    say(f"report: {out}/latency.html")
+    return document
+
+
+def report_text(document: Json) -> str:
+    """Return the report's main tables as text columns."""
+    tables = (scene_table, step_table, ours_table, paper_table)
+    parts = [f"absent: {line}" for line in document["absent"]]
+    parts += [_text(make(document)) for make in tables]
+    return "\n\n".join(parts)
+
+
+def _text(table: Table) -> str:
+    lines = [table.header, *table.rows]
+    widths = [max(len(line[i]) for line in lines) for i in range(len(table.header))]
+    rows = (
+        "  ".join(
+            cell.ljust(width) if i < table.texts else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(line, widths, strict=True))
+        )
+        for line in lines
+    )
+    return "\n".join([f"{table.title}: {table.note}", *(row.rstrip() for row in rows)])
