@@ -21,6 +21,7 @@ COMMANDS = {
     "why": "tell from which steps and inputs an artifact came",
     "store": "list, check, repair, pin and collect what the artifact store holds",
     "benchmark": "measure depth, gravity and whole scenes against captures with truth",
+    "train": "train a network of the pipeline, with its record",
     "doctor": "tell what this machine can run and what is missing",
 }
 

@@ -14,6 +14,7 @@ from flows.benchmark.latency.command import (
 )
 from flows.benchmark.orchestration.options import add_options, from_arguments
 from flows.command import EXIT_FAILED, EXIT_OK, print_json, say
+from flows.command.benchmark_classifier import add_classifier_options, run_classifier
 from flows.command.store_option import open_store
 from storage import Store
 
@@ -22,6 +23,7 @@ DESCRIPTION = f"""\
   garden benchmark depth CAPTURE ...     depth with estimated cameras, after one scale a scene,
                                          beside a plain plane sweep: error and time
   garden benchmark gravity CAPTURE ...   gravity with cameras given and with cameras estimated
+  garden benchmark classifier            the point classifier beside box, distance, connectivity
   garden benchmark orchestration         what a step, a publish and a scene cost beside their
                                          peers, and a thousand simulated scenes
   garden benchmark latency [COLLECTION|CAPTURE ...] [--run] [--repeat N] [--out FOLDER]
@@ -41,7 +43,9 @@ SAMPLE = Path("tests/scenes/corner")
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.description = DESCRIPTION
-    parser.add_argument("name", choices=("sample", "depth", "gravity", "orchestration", "latency"))
+    parser.add_argument(
+        "name", choices=("sample", "depth", "gravity", "orchestration", "latency", "classifier")
+    )
     parser.add_argument("captures", nargs="*", type=Path, metavar="CAPTURE")
     parser.add_argument(
         "--out",
@@ -57,6 +61,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     add_options(parser)
     add_latency_options(parser)
+    add_classifier_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -68,6 +73,8 @@ def run(options: argparse.Namespace) -> int:
         return _sample(options, store)
     if options.name == "orchestration":
         return _orchestration(options, store)
+    if options.name == "classifier":
+        return run_classifier(options, store)
     from flows.benchmark.captures import depth_rows, gravity_row, table
 
     rows = []

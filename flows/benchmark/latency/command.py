@@ -52,7 +52,7 @@ def make_report(options: argparse.Namespace) -> Json:
     """Make the report that the options ask for; return it."""
     from flows.benchmark.latency.report import LatencyOptions, write_latency_report
     from flows.command import say
-    from flows.command.scene_options import store_address
+    from flows.command.store_option import store_address
     from flows.preset import read_preset
 
     if options.repeat < 1:

@@ -1,0 +1,161 @@
+"""Train the point classifier: shards of pairs, a chain of checkpoints, scores beside baselines."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+from garden_models.disentanglement.evaluation.method_scores import ClassifierWeights, MethodScores
+from garden_models.disentanglement.training.augmentations.config import NAMES, NONE, without
+from garden_models.disentanglement.training.config import TrainingPreset
+from garden_models.disentanglement.training.pairs_config import PairsConfig
+from garden_models.disentanglement.training.splits import Split
+from garden_models.disentanglement.training.state import TrainingState
+from tasks.describe_training_pairs import describe_training_pairs
+from tasks.make_training_pairs import make_training_pairs
+from tasks.score_point_classifier import score_baselines, score_point_classifier
+from tasks.step import Ref, StepFailed, fan_out, load
+from tasks.train_point_classifier import start_point_classifier, train_point_classifier
+
+SETTINGS = ("clean", "augmented")
+
+
+@dataclass(frozen=True)
+class TrainedClassifier:
+    """References to all that a training made."""
+
+    preset: TrainingPreset
+    pairs: tuple[Ref, ...]
+    described: tuple[Ref, ...]
+    states: tuple[Ref, ...]
+
+    @property
+    def state(self) -> Ref:
+        """The last checkpoint."""
+        return self.states[-1]
+
+
+@dataclass(frozen=True)
+class EvaluationPairs:
+    """References to the pairs of one setting: for choosing thresholds, and for the score."""
+
+    validation: tuple[Ref, ...]
+    test: tuple[Ref, ...]
+
+
+def train(preset: TrainingPreset) -> TrainedClassifier:
+    """Train by a preset, or find the training in the store. Raises StepFailed."""
+    pairs = shards("train", preset.rooms, preset, preset.pairs)
+    described = _each(lambda shard: describe_training_pairs(shard, preset.network), pairs)
+    states = [start_point_classifier(preset.network, preset.optimisation)]
+    total, every = preset.optimisation.steps, preset.checkpoint_every
+    for done in range(0, total, every):
+        steps = min(every, total - done)
+        states.append(
+            train_point_classifier(
+                states[-1],
+                described,
+                preset.network,
+                preset.optimisation,
+                steps,
+                label=f"to step {done + steps}",
+            )
+        )
+    return TrainedClassifier(preset, pairs, described, tuple(states))
+
+
+def shards(
+    split: Split, rooms: int, preset: TrainingPreset, config: PairsConfig
+) -> tuple[Ref, ...]:
+    """Make a split's pairs, some rooms a shard."""
+    starts = range(0, rooms, preset.rooms_a_shard)
+    kind = "augmented" if config.augmented else "clean"
+
+    def make(start: int) -> Ref:
+        count = min(preset.rooms_a_shard, rooms - start)
+        return make_training_pairs(
+            split, start, count, config, preset.packages, label=f"{split} {kind} {start}"
+        )
+
+    return _each(make, starts)
+
+
+def evaluation_pairs(preset: TrainingPreset) -> dict[str, EvaluationPairs]:
+    """Make the held-out pairs: clean, and with every augmentation at full strength."""
+    full = dataclasses.replace(preset.pairs.augmentations, each=1.0)
+    jitter = dataclasses.replace(full.mesh_jitter, gentle=0.0)
+    configs = {
+        "clean": dataclasses.replace(preset.pairs, augmentations=NONE, augmented=0.0),
+        "augmented": dataclasses.replace(
+            preset.pairs,
+            augmentations=dataclasses.replace(full, mesh_jitter=jitter),
+            augmented=1.0,
+        ),
+    }
+    return {
+        setting: EvaluationPairs(
+            shards("validation", preset.validation_rooms, preset, config),
+            shards("test", preset.test_rooms, preset, config),
+        )
+        for setting, config in configs.items()
+    }
+
+
+def evaluate(
+    weights: ClassifierWeights | None, pairs: dict[str, EvaluationPairs]
+) -> dict[str, MethodScores]:
+    """Score a network (if there is one) and the baselines, by setting."""
+    scores = {}
+    for setting, asked in pairs.items():
+        rows = load(score_baselines(asked.validation, asked.test, label=setting), MethodScores)
+        if weights is not None:
+            own = load(score_point_classifier(weights, asked.test, label=setting), MethodScores)
+            rows = dataclasses.replace(rows, scores=own.scores + rows.scores)
+        scores[setting] = rows
+    return scores
+
+
+def checkpoint_bytes(trained: TrainedClassifier) -> bytes:
+    """Return a training's network as safetensors; the same training gives the same bytes."""
+    from garden_models.disentanglement.network.checkpoint import to_bytes
+    from garden_models.disentanglement.training.optimise import trained_model
+
+    state: TrainingState = load(trained.state, TrainingState)
+    record = {
+        "preset": trained.preset.name,
+        "steps": state.step,
+        "optimisation": dataclasses.asdict(trained.preset.optimisation),
+        "pairs": dataclasses.asdict(trained.preset.pairs),
+        "data": [ref.content for ref in trained.pairs],
+    }
+    return to_bytes(trained_model(state, trained.preset.network), record)
+
+
+def ablations(preset: TrainingPreset) -> dict[str, TrainingPreset]:
+    """Return small trainings that differ in augmentations only."""
+    full = dataclasses.replace(preset.pairs.augmentations, each=1.0)
+    changed: dict[str, Any] = {"all": full}
+    changed |= {f"without {name.replace('_', ' ')}": without(full, name) for name in NAMES}
+    changed["none"] = NONE
+    return {
+        name: dataclasses.replace(
+            preset,
+            name=f"{preset.name}, {name}",
+            pairs=dataclasses.replace(
+                preset.pairs,
+                augmentations=augmentations,
+                augmented=0.0 if name == "none" else preset.pairs.augmented,
+            ),
+        )
+        for name, augmentations in changed.items()
+    }
+
+
+def _each(function: Any, items: Any) -> tuple[Ref, ...]:
+    """Run a step for every item at the same time; raise the first failure."""
+    results = fan_out(function, items)
+    for result in results:
+        if isinstance(result, StepFailed):
+            raise result
+    return tuple(result for result in results if isinstance(result, Ref))
