@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from garden_models.disentanglement.config import LabelPoints
+from garden_models.disentanglement.network.shipped import DIGEST
+from garden_models.disentanglement.protocol import TRAINED
 from garden_models.progress import Progress, silent
 from garden_models.scene import (
+    BadInput,
     GravityView,
     ObjectMasks,
     ObjectMesh,
@@ -15,7 +20,24 @@ from garden_models.scene import (
 from tasks.step import step
 
 
-@step(version=1, packages=("numpy", "scipy", "trimesh"))
+def _weights(config: LabelPoints, **_others: object) -> dict[str, str | Path]:
+    """Return the checkpoint that the method reads: its content is part of the key."""
+    if config.method not in TRAINED:
+        return {}
+    if config.weights:
+        path = Path(config.weights)
+        if not path.is_file():
+            raise BadInput(f"no such checkpoint of a point classifier: {path}")
+        return {"point_classifier": path}
+    return {"point_classifier": DIGEST}
+
+
+@step(
+    version=1,
+    packages=("numpy", "scipy", "trimesh"),
+    weights=_weights,
+    skip=("config.weights",),
+)
 def label_points(
     reconstruction: Reconstruction,
     gravity_view: GravityView,

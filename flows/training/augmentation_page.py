@@ -18,6 +18,8 @@ def write_gallery(path: Path, preset: str, crops: int = CROPS) -> None:
     from garden_models.disentanglement.training.gallery import augmentation_gallery
 
     config = training_preset(preset).pairs.augmentations
+    jitter = dataclasses.replace(config.mesh_jitter, gentle=0.0)
+    config = dataclasses.replace(config, each=1.0, mesh_jitter=jitter)
     rows = augmentation_gallery(crops, config)
     settings = "".join(
         f"<li><b>{name.replace('_', ' ')}</b>: {_values(getattr(config, name))}</li>"

@@ -10,6 +10,8 @@ class LabelPoints:
     """Which classifier labels which points."""
 
     method: str = "geometric"
+    weights: str = ""
+    """A checkpoint for the method ``network``; empty: the one that is shipped."""
     threshold: float = 0.5
     relaxed: float = 0.35
     """The box of the mesh grows by this share of its size on every side but below (paper:

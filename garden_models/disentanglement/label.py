@@ -56,7 +56,7 @@ def label_points(
         masks.support,
     )
     probability = np.zeros(len(points_gv), np.float32)
-    probability[near] = classifier(config.method)(crop, progress)
+    probability[near] = classifier(config.method, config.weights)(crop, progress)
     removed = int((probability >= config.threshold).sum())
     verdict = OK
     if not removed:

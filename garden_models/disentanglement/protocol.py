@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 
 import numpy as np
@@ -56,15 +57,27 @@ Classifier = Callable[[Crop, Progress], Float[np.ndarray, " n"]]
 
 METHODS: dict[str, str] = {
     "geometric": "garden_models.disentanglement.geometric_rule:classify",
+    "network": "garden_models.disentanglement.network.classify:classify",
 }
+TRAINED = ("network",)
+"""Methods that take a checkpoint (``weights``, a path)."""
 
 
-def classifier(method: str) -> Classifier:
-    """Return a classifier by name, importing it only now. Raises BadInput if unknown."""
+def classifier(method: str, weights: str = "") -> Classifier:
+    """Return a classifier by name, importing it only now.
+
+    Raises BadInput if it is unknown, or if it takes no ``weights`` and some are given.
+    """
     if method not in METHODS:
         raise BadInput(
             f"unknown disentanglement method {method!r}: choose one of {', '.join(METHODS)}"
         )
+    if weights and method not in TRAINED:
+        raise BadInput(
+            f"the disentanglement method {method!r} takes no weights: set disentangle.method to "
+            f"one of {', '.join(TRAINED)}"
+        )
     module, function = METHODS[method].split(":")
-    found: Classifier = getattr(import_module(module), function)
-    return found
+    found = getattr(import_module(module), function)
+    chosen: Classifier = partial(found, weights=weights) if weights else found
+    return chosen
