@@ -9,6 +9,8 @@ from typing import Any
 
 from flows.benchmark.latency.tables import Table, ours_table, paper_table, scene_table, step_table
 from flows.benchmark.latency.timing import DEFINITIONS
+from flows.command import EXIT_OK, print_json, say
+from flows.command.store_option import store_address
 from flows.wrong_use import WrongUse
 
 Json = dict[str, Any]
@@ -21,10 +23,21 @@ DEFINED = "\n".join(
 )
 
 
-def add_latency_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options that only ``latency`` takes."""
-    group = parser.add_argument_group("latency")
-    how = group.add_mutually_exclusive_group()
+def configure(name: str, parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.epilog = (
+        "Rendering, which only reports and evaluations need, is left out of the totals:\n" + DEFINED
+    )
+    parser.add_argument(
+        "captures", nargs="*", type=Path, metavar="COLLECTION|CAPTURE", help="what to measure"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=OUT, metavar="FOLDER", help="where the report goes (latency)"
+    )
+    parser.add_argument(
+        "--engine", choices=("prefect", "local"), default="prefect", help="what runs the scenes"
+    )
+    how = parser.add_mutually_exclusive_group()
     how.add_argument(
         "--read",
         action="store_true",
@@ -36,28 +49,36 @@ def add_latency_options(parser: argparse.ArgumentParser) -> None:
         dest="execute",
         help="run every scene cold, cached and warm with a throw-away store in --out",
     )
-    group.add_argument(
+    parser.add_argument(
         "--repeat", type=int, default=1, metavar="N", help="measure N times, for p50 and p95"
     )
-    group.add_argument(
+    parser.add_argument(
         "--packages", type=Path, metavar="FOLDER", help="where the scenes' packages are (scenes)"
     )
-    group.add_argument("--preset", help="named preset or a TOML file")
-    group.add_argument(
+    parser.add_argument("--preset", help="named preset or a TOML file")
+    parser.add_argument(
         "--set", action="append", default=[], metavar="STEP.OPTION=VALUE", dest="settings"
     )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Make the report and print its tables; return the exit code."""
+    document = make_report(options)
+    if options.json:
+        print_json(document)
+    else:
+        print(report_text(document))
+    return EXIT_OK
 
 
 def make_report(options: argparse.Namespace) -> Json:
     """Make the report that the options ask for; return it."""
     from flows.benchmark.latency.report import LatencyOptions, write_latency_report
-    from flows.command import say
-    from flows.command.store_option import store_address
     from flows.preset import read_preset
 
     if options.repeat < 1:
         raise WrongUse(f"--repeat {options.repeat}: measure at least once")
-    out = options.out or OUT
+    out = options.out
     preset = None
     if options.preset or options.settings:
         preset = read_preset(options.preset or "embedded", options.settings)

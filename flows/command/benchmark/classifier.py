@@ -7,26 +7,25 @@ import dataclasses
 from pathlib import Path
 
 from flows.command import EXIT_FAILED, EXIT_OK, print_json, say
-from storage import Store
+from flows.command.store_option import open_store
 
 PRESETS = ("smoke", "cpu", "paper")
 
 
-def add_classifier_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options that only ``classifier`` reads."""
-    group = parser.add_argument_group("classifier")
-    group.add_argument("--weights", metavar="FILE", type=Path, help="a checkpoint (the shipped)")
-    group.add_argument(
+def configure(name: str, parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument("--weights", metavar="FILE", type=Path, help="a checkpoint (the shipped)")
+    parser.add_argument(
         "--preset", choices=PRESETS, default="cpu", help="whose held-out pairs (cpu)"
     )
-    group.add_argument(
+    parser.add_argument(
         "--ablation",
         action="store_true",
         help="train a network of the preset without each augmentation in turn",
     )
 
 
-def run_classifier(options: argparse.Namespace, store: Store) -> int:
+def run(options: argparse.Namespace) -> int:
     """Print the supplement's table and what it leaves out; return the exit code."""
     from flows.benchmark.captures import table
     from flows.terminal_view import TerminalView
@@ -35,6 +34,7 @@ def run_classifier(options: argparse.Namespace, store: Store) -> int:
     from garden_models.disentanglement.network.shipped import checkpoint_file
     from tasks.step import StepFailed
 
+    store = open_store(options)
     preset = classifier_preset(options.preset)
     path = options.weights or checkpoint_file()
     try:
