@@ -118,6 +118,8 @@ def run_jobs(
 ) -> CollectionResult:
     """Run any jobs as the scenes of a collection, whose ``scenes`` are not looked at."""
     jobs = {order.name: order for order in orders}
+    if options.scenes_at_once is not None and options.scenes_at_once < 1:
+        raise WrongUse(f"{options.scenes_at_once} scenes at once cannot be: give 1 or more")
     with only_runner(collection.out), stop_on_terminate():
         state = _fresh_state(collection, jobs, store_address)
         chosen = chosen_names(options.only, state.name, state.rows, state.out)
@@ -155,6 +157,7 @@ def _fresh_state(
         rows=rows,
         owner=Owner.here(),
         remarks=list(collection.remarks),
+        before=dict(before.rows) if before else {},
     )
 
 
@@ -205,7 +208,7 @@ class _Runner:
         """Do everything; the state says how it ended, however it ends."""
         for name in self._chosen:
             if name in self._jobs:
-                self._state.rows[name].status = "waiting"
+                self._state.rows[name] = self._fresh(name, "waiting")
             else:
                 self._tell("finished", self._state.rows[name])
         self._state.save()
@@ -221,6 +224,7 @@ class _Runner:
         finally:
             self._end_workers()
             end_running(self._state, "the batch was stopped; the same command goes on from there")
+            self._state.restore_waiting()
             self._save_all()
         rows = tuple(self._state.rows[name] for name in self._chosen)
         return CollectionResult(rows, worst_status(rows))
@@ -301,8 +305,14 @@ class _Runner:
 
     def _start(self, name: str, worker: WorkerProcess) -> None:
         worker.give(self._jobs[name])
-        self._state.rows[name] = SceneRow(name, "running", started=worker.started)
+        self._state.rows[name] = self._fresh(name, "running")
+        self._state.rows[name].started = worker.started
         self._tell("started", self._state.rows[name])
+
+    def _fresh(self, name: str, status: Status) -> SceneRow:
+        """Return a scene's row without what was known, but for the package that is there."""
+        before = self._state.before.get(name)
+        return SceneRow(name, status, package=before.package if before else None)
 
     def _listen(self, seconds: float) -> None:
         by_pipe = {worker.answers: worker for worker in self._workers}

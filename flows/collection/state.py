@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from flows.collection.row import SceneRow
+from flows.collection.row import ENDED, SceneRow
 from flows.wrong_use import WrongUse
 from storage.formats.package import PackageError
 from storage.owner import Owner
@@ -46,6 +46,9 @@ class CollectionState:
     started: float = field(default_factory=time.time)
     updated: float = 0.0
     remarks: list[str] = field(default_factory=list)
+    before: dict[str, SceneRow] = field(default_factory=dict)
+    """What the last batch left of these scenes; it holds until they are looked at again."""
+
     _written: float = 0.0
 
     def save(self, *, now: bool = True) -> None:
@@ -59,15 +62,31 @@ class CollectionState:
         write_beside(self.out / STATE, _dump(self.to_json()))
 
     def save_failed(self) -> None:
-        """Write ``failed.json``: the scenes that failed, and why."""
-        failed = [row for row in self.rows.values() if row.status == "failed"]
+        """Write ``failed.json``: the scenes that failed, and why.
+
+        A scene that failed the last time and has not ended since is still one of them, so
+        that a rerun which is stopped forgets none.
+        """
         document = {
             "schema": "garden.failed/1",
             "collection": self.name,
             "source": self.source,
-            "scenes": [{"name": row.name, "reasons": row.reasons} for row in failed],
+            "scenes": [{"name": row.name, "reasons": row.reasons} for row in self._failed()],
         }
         write_beside(self.out / FAILED, _dump(document))
+
+    def _failed(self) -> list[SceneRow]:
+        last = {
+            name: self.before.get(name, row) if row.status not in ENDED else row
+            for name, row in self.rows.items()
+        }
+        return [row for row in last.values() if row.status == "failed"]
+
+    def restore_waiting(self) -> None:
+        """Give the scenes that were not reached the rows that they had before."""
+        for name, row in self.rows.items():
+            if row.status == "waiting" and name in self.before:
+                self.rows[name] = self.before[name]
 
     def to_json(self) -> dict[str, Any]:
         """Return the file's document."""

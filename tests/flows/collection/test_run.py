@@ -125,6 +125,27 @@ def test_only_names_scenes_and_an_unknown_one_is_wrong_use(home: Path) -> None:
         batch(home, orders, only=("z",))
 
 
+def test_a_rerun_that_is_stopped_forgets_no_failure(home: Path) -> None:
+    batch(home, toys(home, a="", b="fails", c="fails"))
+
+    def stop(event: RowEvent) -> None:
+        if event.kind == "finished":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        batch(home, toys(home, a="", b="", c=""), on_event=stop, only=("failed",), scenes_at_once=1)
+    rows = state_of(home).rows
+    assert {name: row.status for name, row in rows.items()} == {"a": "ok", "b": "ok", "c": "failed"}
+    assert rows["c"].reasons == ["the photos of c show nothing"]
+    manifest = json.loads((home / "out" / "failed.json").read_text())
+    assert [scene["name"] for scene in manifest["scenes"]] == ["c"]
+
+
+def test_a_batch_without_workers_is_wrong_use(home: Path) -> None:
+    with pytest.raises(WrongUse, match="at once"):
+        batch(home, toys(home, a=""), scenes_at_once=0)
+
+
 def test_only_failed_without_a_manifest_says_so(home: Path) -> None:
     with pytest.raises(WrongUse, match=r"failed\.json"):
         batch(home, toys(home, a=""), only=("failed",))
