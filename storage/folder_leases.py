@@ -6,12 +6,12 @@ system drops with its owner.
 
 from __future__ import annotations
 
-import uuid
 from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 
 from storage import _os, locks
 from storage.leases import LEASE_S, Accepts, Lease, LeaseTable, lease_name
+from storage.staging import own_name
 
 
 class FolderLeases(LeaseTable):
@@ -54,7 +54,7 @@ class FolderLeases(LeaseTable):
     def _draft(self, lease: Lease) -> Path:
         drafts = self._store / "tmp"
         _os.ensure_folder(drafts, durable=False)
-        draft = drafts / f"{lease.token}-{uuid.uuid4().hex}.lease"
+        draft = drafts / f"{own_name()}.lease"
         _os.active.write(draft, lease.to_bytes())
         return draft
 

@@ -8,6 +8,8 @@ import socket
 from dataclasses import dataclass
 from pathlib import Path
 
+from storage.digest import digest_bytes
+
 
 @dataclass(frozen=True)
 class Owner:
@@ -42,6 +44,26 @@ class Owner:
         if self.pid_space != pid_space:
             return False
         return _start_ticks(self.pid) != self.started
+
+
+def own_mark() -> str:
+    """Return a short mark of this process, for names of files that may hold nothing yet."""
+    pid = os.getpid()
+    return f"{_place_mark()}-{pid}-{_start_ticks(pid)}"
+
+
+def is_dead_mark(mark: str) -> bool:
+    """Tell whether ``mark`` is one of ``own_mark`` whose process is surely gone."""
+    place, _, process = mark.partition("-")
+    pid, _, started = process.partition("-")
+    if place != _place_mark() or not (pid.isdecimal() and started.isdecimal()):
+        return False
+    return _start_ticks(int(pid)) != int(started)
+
+
+@functools.cache
+def _place_mark() -> str:
+    return digest_bytes("/".join(_place()).encode())[3:15]
 
 
 @functools.cache

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from storage import _os
-from storage.owner import Owner
+from storage.owner import Owner, is_dead_mark, own_mark
 
 OWNER_FILE = "owner.json"
 _ABANDONED_AFTER_S = 24 * 3600.0  # when the owner cannot be asked (another machine's)
@@ -23,7 +23,7 @@ def staging_folder(store: Path, *, durable: bool) -> Iterator[Path]:
     """Give an empty folder below ``store/tmp``, marked with its owner; remove it at the end."""
     parent = store / "tmp"
     _os.ensure_folder(parent, durable=durable)
-    outer = parent / uuid.uuid4().hex
+    outer = parent / own_name()
     _os.active.mkdir(outer)
     try:
         owner = json.dumps(dataclasses.asdict(Owner.here())).encode()
@@ -39,6 +39,11 @@ def staging_folder(store: Path, *, durable: bool) -> Iterator[Path]:
     _os.remove_tree(outer)
 
 
+def own_name() -> str:
+    """Return a new name that says whose it is before anything is in it."""
+    return f"{uuid.uuid4().hex}-{own_mark()}"
+
+
 def sweep(store: Path) -> int:
     """Remove staging folders whose owner is dead or unknown for a day; return how many."""
     parent = store / "tmp"
@@ -51,12 +56,15 @@ def sweep(store: Path) -> int:
         if entry.is_dir(follow_symlinks=False):
             _os.remove_tree(Path(entry.path))
         else:
-            _os.active.unlink(Path(entry.path))
+            with suppress(FileNotFoundError):  # another one sweeps, too
+                _os.active.unlink(Path(entry.path))
         swept += 1
     return swept
 
 
 def _abandoned(folder: Path) -> bool:
+    if is_dead_mark(folder.stem.partition("-")[2]):
+        return True
     try:
         owner = Owner(**json.loads((folder / OWNER_FILE).read_bytes()))
     except (OSError, ValueError, TypeError):
