@@ -10,7 +10,7 @@ recorded nevertheless is forgotten again, so that it is a miss and no dangling a
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -22,6 +22,8 @@ from storage.ledger import Entry, Ledger
 from storage.medium import Medium
 from storage.objects import MANIFEST
 from storage.roots import held
+
+_BATCH = 1000
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,8 @@ class _Collection:
 
     def preview(self) -> Collected:
         choice, dead, sizes = self._choose()
-        return _result(choice, {d: sizes[d] for d in dead}, sum(sizes.values()), 0, dry_run=True)
+        old = {digest: sizes[digest] for digest in dead if self._is_old(digest)}
+        return _result(choice, old, sum(sizes.values()), 0, dry_run=True)
 
     def explain(self) -> None:
         """Keep what is known of what will be forgotten; on a full disk, what there is room for."""
@@ -103,13 +106,14 @@ class _Collection:
         choice, dead, sizes = self._choose()
         self._delete(entry for entry, _why in choice.forgotten)
         self.ledger.refresh()
-        live = self.ledger.live_objects()
-        dead = [digest for digest in dead if digest not in live and self._is_old(digest)]
-        self.medium.remove(*dead)
-        lost = set(dead)
+        removed: dict[str, int] = {}
+        for batch in _batches([digest for digest in dead if not self.ledger.gives(digest)]):
+            old = [digest for digest in batch if self._is_old(digest)]
+            self.medium.remove(*old)
+            removed |= {digest: sizes[digest] for digest in old}
         self.ledger.refresh()
-        self._delete(entry for entry in self.ledger if not lost.isdisjoint(entry.objects))
-        return choice, {digest: sizes[digest] for digest in dead}, sum(sizes.values())
+        self._delete(entry for entry in self.ledger if not removed.keys().isdisjoint(entry.objects))
+        return choice, removed, sum(sizes.values())
 
     def _delete(self, entries: Iterable[Entry]) -> None:
         names = [name for entry in entries for name in (entry.name, use_name(entry.key))]
@@ -117,13 +121,13 @@ class _Collection:
             self.medium.delete(*names)
 
     def _choose(self) -> tuple[Choice, list[str], dict[str, int]]:
-        """Return what to forget, the objects that nothing needs then, and all known sizes."""
+        """Return what to forget, the objects that no action gives then, and all known sizes."""
         roots = held(self.medium)
         sizes = self.ledger.live_objects()
         orphans = [digest for digest in self.medium.objects() if digest not in sizes]
         sizes |= {digest: self._size(digest) for digest in orphans}
         old = [d for d in orphans if d not in roots.digests and self._is_old(d)]
-        waiting = sum(sizes[d] for d in orphans) - sum(sizes[d] for d in old)
+        young_bytes = sum(sizes[d] for d in orphans) - sum(sizes[d] for d in old)
         choice = choose(
             self.ledger,
             roots,
@@ -131,15 +135,16 @@ class _Collection:
             now=self.now,
             grace_s=self.grace_s,
             quota_bytes=self.quota_bytes,
-            other_bytes=waiting,
+            other_bytes=young_bytes,
         )
         return choice, old + self._bereft(choice, roots), sizes
 
     def _bereft(self, choice: Choice, roots: Held) -> list[str]:
+        """Return the objects that only what is forgotten gave."""
         gone = {entry.key for entry, _why in choice.forgotten}
         still = {d for entry in self.ledger if entry.key not in gone for d in entry.objects}
         lost = {d for entry, _why in choice.forgotten for d in entry.objects}
-        return sorted(d for d in lost - still - roots.digests if self._is_old(d))
+        return sorted(lost - still - roots.digests)
 
     def _is_old(self, digest: str) -> bool:
         try:
@@ -150,6 +155,12 @@ class _Collection:
     def _size(self, digest: str) -> int:
         sizes = self.medium.members(digest)
         return sum(sizes.values()) - sizes.get(MANIFEST, 0)
+
+
+def _batches(digests: list[str]) -> Iterator[list[str]]:
+    """Give so few at a time that their age is still true when they go."""
+    for start in range(0, len(digests), _BATCH):
+        yield digests[start : start + _BATCH]
 
 
 def _result(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Iterator
 from contextlib import suppress
@@ -34,10 +35,11 @@ class Ledger:
         self._medium = medium
         self._written: dict[str, float] = {}
         self._known: dict[str, Entry] = {}
+        self._live: dict[str, int] = {}
         self.refresh()
 
-    def refresh(self) -> set[str]:
-        """Take notice of what has changed; return the names of the actions that are new."""
+    def refresh(self) -> None:
+        """Take notice of what has changed."""
         written = dict(self._medium.times("actions/"))
         used = dict(self._medium.times("uses/"))
         changed = {name for name, when in written.items() if self._written.get(name) != when}
@@ -52,15 +54,19 @@ class Ledger:
         for name, entry in self._known.items():
             last = max(written[name], used.get(use_name(entry.key), 0.0))
             if last != entry.used:
-                self._known[name] = _used_at(entry, last)
-        return changed
+                self._known[name] = dataclasses.replace(entry, used=last)
+        self._live = {d: size for entry in self for d, size in entry.objects.items()}
 
     def __iter__(self) -> Iterator[Entry]:
         return iter(list(self._known.values()))
 
+    def gives(self, digest: str) -> bool:
+        """Tell whether some action gave an object."""
+        return digest in self._live
+
     def live_objects(self) -> dict[str, int]:
         """Return the bytes of every object that some action gave, by digest."""
-        return {digest: size for entry in self for digest, size in entry.objects.items()}
+        return dict(self._live)
 
     def record(self, entry: Entry) -> ActionRecord | None:
         """Return the whole record of an entry, None if it is gone."""
@@ -90,7 +96,3 @@ def _entry(name: str, document: dict) -> Entry:
         contents=tuple(output["content"] for output in outputs),
         used=0.0,
     )
-
-
-def _used_at(entry: Entry, when: float) -> Entry:
-    return Entry(**{**entry.__dict__, "used": when})

@@ -29,6 +29,7 @@ from storage.bucket import object_prefix
 from storage.codec.tree import encode
 from tasks.step import Ref, RunContext, load, run_context, step
 from tests.faults.damage import Damage, damages_of_file, damages_of_object
+from tests.faults.part import Count, part
 from tests.storage.media import behind
 from tests.storage.samples import same
 from tests.tasks.step.test_nouns_stored import NOUNS, build
@@ -190,6 +191,15 @@ def trials(
         for damage in list(bench.damages(flips, chance)):
             if chance.random() < share:
                 yield bench.try_damage(damage)
+
+
+@part("corruption")
+def whole(folder: Path) -> Iterator[Count]:
+    """Try every damage on every sample, for ``make faults``."""
+    for name in SAMPLES:
+        found = list(trials(folder, flips=8, seed=0, share=1.0, names=[name]))
+        wrong = tuple(f"{t.damage}: {'; '.join(t.wrong)}" for t in found if t.wrong)
+        yield Count(f"damages of {name}", len(found), wrong)
 
 
 def report(found: list[Trial]) -> str:

@@ -62,7 +62,7 @@ def test_a_hit_is_a_use_also_in_the_quota(store: Store) -> None:
 
 
 def test_a_hit_leaves_a_mark_once_an_hour_and_a_plan_none(store: Store) -> None:
-    record = did(store, "a")
+    record = did(store, "a", days_ago=1)
     mark = store.path / use_name(record.key)
     store.lookup(record.key, mend=False)
     assert not mark.exists()

@@ -19,8 +19,8 @@ def the_object(store: Store, record: ActionRecord) -> Path:
 
 
 def flip(store: Store, record: ActionRecord) -> None:
-    files = [p for p in the_object(store, record).rglob("*") if p.is_file() and "c" in p.parts]
-    member = max(files, key=lambda p: p.stat().st_size)
+    files = [p for p in the_object(store, record).rglob("*") if p.is_file()]
+    member = max((p for p in files if p.suffix != ".json"), key=lambda p: p.stat().st_size)
     data = bytearray(member.read_bytes())
     data[len(data) // 2] ^= 1
     member.chmod(0o644)
