@@ -33,6 +33,8 @@ def sample(hint: Any) -> Any:
         return (sample(typing.get_args(hint)[0]),) * 2
     if dataclasses.is_dataclass(hint):
         return hint()
+    if typing.get_origin(hint) is typing.Literal:
+        return typing.get_args(hint)[0]
     return {str: "a.jpg", int: 3, float: 0.5, bool: True}[hint]
 
 

@@ -72,7 +72,14 @@ class ToyJob:
         if self.does == "crashes":
             print("a library says farewell", flush=True)
             os.kill(os.getpid(), signal.SIGSEGV)
-        context = RunContext(store, self.name, "local", events, budget=events.budget)
+        context = RunContext(
+            store,
+            self.name,
+            "local",
+            events,
+            budget=events.budget,
+            elsewhere=events.elsewhere,
+        )
         if self.does == "prefect":
             from flows.prefect_flow import scene_flow
 
