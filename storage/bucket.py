@@ -13,14 +13,13 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from itertools import groupby
 from pathlib import Path
 
 from blake3 import blake3
 
-from storage import workroom
+from storage import bucket_sweep, workroom
 from storage.bucket_address import BucketAddress
-from storage.bucket_client import BucketClient, Entry
+from storage.bucket_client import BucketClient
 from storage.bucket_leases import BucketLeases
 from storage.digest import PREFIX, digest_bytes, hexadecimal
 from storage.errors import StoreError, StoreFormatError, StoreFull, StoreReadOnly
@@ -28,10 +27,10 @@ from storage.leases import LEASE_S
 from storage.manifest import MANIFEST
 from storage.medium import Level
 from storage.members import MemberWriter
+from storage.object_names import object_prefix, sealed_by
 from storage.read_cache import ReadCache
 
 _REQUESTS_AT_ONCE = 8
-_UNFINISHED_FOR_S = 24 * 3600.0  # then members without a manifest are taken for abandoned
 _REFRESH_AFTER_S = 3600.0
 _SEALING_TRIES = 3
 _COLLECTING = digest_bytes(b"garden.collecting/1")
@@ -164,8 +163,8 @@ class BucketMedium:
     def objects(self) -> Iterator[str]:
         """Give the digest of every object that has a manifest, sorted."""
         for entry in self._bucket.list("objects/b3/"):
-            if entry.name.endswith("/" + MANIFEST) and entry.name.count("/") == 4:
-                yield _digest_of(entry)
+            if (digest := sealed_by(entry.name)) is not None:
+                yield digest
 
     def members(self, digest: str) -> dict[str, int]:
         """Return the files of an object and their bytes, in one request for a thousand."""
@@ -241,19 +240,7 @@ class BucketMedium:
 
     def sweep(self) -> int:
         """Remove members that have had no manifest for a day, and leases that ended then."""
-        before = time.time() - _UNFINISHED_FOR_S
-        swept = workroom.sweep()
-        for place, group in groupby(self._bucket.list("objects/b3/"), _place_of):
-            entries = list(group)
-            names = [entry.name for entry in entries]
-            if place + MANIFEST in names or max(e.modified for e in entries) > before:
-                continue
-            if self.read(place + MANIFEST) is None:  # as of now, not of the listing
-                self._bucket.delete(names)
-                swept += 1
-        ended = [e.name for e in self._bucket.list("leases/") if e.modified < before]
-        self._bucket.delete(ended)
-        return swept + len(ended)
+        return workroom.sweep() + bucket_sweep.sweep(self._bucket)
 
     def explain(self, error: OSError) -> StoreError | None:
         """Return the store's own error for a full or read-only place."""
@@ -270,18 +257,3 @@ class BucketMedium:
                 " credentials may do (PutObject, DeleteObject) or choose another store with --store"
             )
         return None
-
-
-def object_prefix(digest: str) -> str:
-    """Return what the names of an object's files begin with."""
-    name = hexadecimal(digest)
-    return f"objects/b3/{name[:2]}/{name[2:]}/"
-
-
-def _place_of(entry: Entry) -> str:
-    return "/".join(entry.name.split("/")[:4]) + "/"
-
-
-def _digest_of(entry: Entry) -> str:
-    _objects, _b3, shelf, name, _manifest = entry.name.split("/")
-    return f"b3:{shelf}{name}"
