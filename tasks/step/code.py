@@ -10,6 +10,7 @@ they are (``storage.formats`` does count: it reads what comes from outside).
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
 import importlib.metadata
 import importlib.util
@@ -150,6 +151,8 @@ def forget_code() -> None:
 
 _cache: dict[Path, tuple[tuple[int, int], _Source]] = {}
 _guard = threading.Lock()
+_parsing = threading.Lock()
+_PARSES = 20
 
 
 def _read(path: Path, module: str) -> _Source:
@@ -169,11 +172,24 @@ def _read(path: Path, module: str) -> _Source:
 def _parse(data: bytes, module: str, *, is_package: bool) -> _Source:
     words: list[str] = []
     special: list[ast.AST] = []
-    _spell(ast.parse(data), words, special)
+    _spell(_tree(data), words, special)
     imports: set[str] = set()
     for node in special:
         imports |= _imports(node, module, is_package=is_package)
     return _Source(digest_bytes("\0".join(words).encode())[:19], frozenset(imports))
+
+
+def _tree(data: bytes) -> ast.AST:
+    """Parse a file; again if it met another thread's parsing.
+
+    Some CPythons, 3.11.7 among them, then raise SystemError ("AST constructor recursion depth
+    mismatch"). Threads here take turns; libraries parse too, and do not.
+    """
+    with _parsing:
+        for _attempt in range(_PARSES - 1):
+            with contextlib.suppress(SystemError):
+                return ast.parse(data)
+        return ast.parse(data)
 
 
 def _spell(node: ast.AST, words: list[str], special: list[ast.AST]) -> None:

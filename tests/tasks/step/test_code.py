@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import importlib
 import subprocess
@@ -210,3 +211,23 @@ def test_keys_do_not_depend_on_the_hash_seed() -> None:
         for seed in ("1", "2")
     }
     assert len(keys) == 1
+
+
+def test_another_threads_parsing_is_no_error_of_a_step(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parse, calls = ast.parse, []
+
+    def disturbed(*arguments: Any) -> ast.AST:
+        calls.append(arguments)
+        if len(calls) % 3:
+            raise SystemError("AST constructor recursion depth mismatch (before=90, after=77)")
+        return parse(*arguments)
+
+    undisturbed = digest()
+    (package / "deep.py").write_text("LIMIT = 3  # another stamp\n")
+    with monkeypatch.context() as patch:
+        patch.setattr(ast, "parse", disturbed)
+        again = digest()
+    assert again == undisturbed
+    assert len(calls) == 3
