@@ -11,10 +11,10 @@ from storage.redact import redact
 
 
 def verdict_state(status: str, reasons: Sequence[str], data: dict[str, Any]) -> State[Any]:
-    """Return Completed for ``ok``, Completed called Degraded, or Failed, with the reasons."""
+    """Return Completed for ``ok``, Completed called Degraded, else Failed, with the reasons."""
     message = redact("; ".join(reasons))
-    if status == "failed":
-        return Failed(message=message or "failed without a reason")
+    if status == "ok":
+        return Completed(message=message or None, data=data)
     if status == "degraded":
         return Completed(name="Degraded", message=message, data=data)
-    return Completed(message=message or None, data=data)
+    return Failed(message=message or f"{status}, without a reason")

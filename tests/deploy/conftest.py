@@ -114,7 +114,7 @@ def prefect_service(home: Path, **more: str) -> Iterator[Service]:
                 return httpx.get(f"{api}/health", timeout=2).is_success
             return False
 
-        wait_for("the server", is_up, 120)
+        wait_for("the server", is_up, 240)
         yield Service(api, environment, home)
 
 

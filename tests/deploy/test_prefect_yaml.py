@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import importlib
+import re
 from typing import Any
 
 import pytest
 import yaml
 
-from deploy.register import DEPLOYMENTS, POOL, local_timezone
+from deploy.register import DEPLOYMENTS, HOME, POOL, local_timezone
 
 DOCUMENT = yaml.safe_load(DEPLOYMENTS.read_text())
 BY_NAME = {deployment["name"]: deployment for deployment in DOCUMENT["deployments"]}
@@ -59,6 +60,25 @@ def test_what_is_scheduled_is_never_run_twice_at_once() -> None:
     for deployment in BY_NAME.values():
         if "schedules" in deployment:
             assert deployment["concurrency_limit"]["limit"] == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "cron"),
+    [
+        ("collection", "0 1 * * *"),
+        ("latency", "0 7 * * 6"),
+        ("store-maintenance", "0 12 * * 6"),
+    ],
+)
+def test_nightly_and_weekly_schedules(name: str, cron: str) -> None:
+    [schedule] = BY_NAME[name]["schedules"]
+    assert schedule["cron"] == cron
+
+
+def test_the_documentation_tells_of_every_deployment_and_of_no_other() -> None:
+    text = (HOME / "docs" / "deploy.md").read_text()
+    told = re.findall(r"^\| `[\w-]+/([\w-]+)` \|", text, re.MULTILINE)
+    assert told == list(BY_NAME)
 
 
 def test_this_machine_has_a_time_zone() -> None:

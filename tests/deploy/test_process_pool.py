@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Collection
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -103,3 +104,54 @@ def completed_toys(service: Service, known: Collection[Any] = ()) -> list[Any]:
 
 def at_least(count: int, runs: list[Any]) -> list[Any]:
     return runs if len(runs) >= count else []
+
+
+def test_the_nightly_collection_says_what_failed_and_executes_only_what_changed(
+    pool: Service, tmp_path: Path
+) -> None:
+    from prefect.client.schemas.schedules import IntervalSchedule
+
+    for number, scene in enumerate(("desk", "shelf")):
+        blank_photos(tmp_path / "rooms" / scene, shade=100 + number)
+    collection = ("--collection", str(tmp_path / "rooms"))
+    pool.python("deploy/register.py", *collection, "--out", str(tmp_path / "out"))
+    with pool.client() as client:
+        deployment = client.read_deployment_by_name("factorize-collection/collection")
+        often = IntervalSchedule(interval=timedelta(seconds=15))
+        client.create_deployment_schedules(deployment.id, [(often, True)])
+    try:
+        nights = wait_for(
+            "two nights", lambda: at_least(2, runs_of(pool, "collection", "FAILED")), 400
+        )
+        assert scenes_ingested(pool) == {"desk": 1, "shelf": 1}
+        blank_photos(tmp_path / "rooms" / "shelf", shade=200)
+        wait_for("another night", lambda: scenes_ingested(pool)["shelf"] == 2, 400)
+    finally:
+        with pool.client() as client:
+            client.delete_deployment(deployment.id)
+    assert scenes_ingested(pool)["desk"] == 1
+    for night in nights:
+        assert night.auto_scheduled
+        assert night.state.message.startswith("2 of 2 scenes failed; desk: no two of the 3 photos")
+
+
+def blank_photos(folder: Path, shade: int) -> None:
+    """Write photos that can be read, and in which nothing can be matched."""
+    from PIL import Image
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for number in range(3):
+        Image.new("RGB", (64, 48), (shade, shade, number)).save(folder / f"{number}.png")
+
+
+def scenes_ingested(service: Service) -> Counter[str]:
+    """Count the task runs that ingested a capture (and not its cached artifact), by scene."""
+    from prefect.client.schemas.filters import TaskRunFilter, TaskRunFilterName
+
+    ingest = TaskRunFilter(name=TaskRunFilterName(any_=["ingest"]))
+    with service.client() as client:
+        scenes = {run.id: run.name for run in client.read_flow_runs()}
+        tasks = client.read_task_runs(task_run_filter=ingest)
+    return Counter(
+        scenes[task.flow_run_id] for task in tasks if task.state and task.state.name == "Completed"
+    )
