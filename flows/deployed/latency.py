@@ -39,12 +39,4 @@ def latency_report(
     except (WrongUse, BadInput, UnreadableInput, StoreMissing) as error:
         return verdict_state("failed", [str(error)], {})
     report = str((folder / "latency.html").resolve())
-    return verdict_state(verdict(document), document["absent"], {"report": report})
-
-
-def verdict(document: dict[str, Any]) -> str:
-    """Return ``failed`` for a report of nothing, ``degraded`` if a scene's cold seconds lack."""
-    known = {mode: over["count"] for mode, over in document["over_scenes"].items()}
-    if not any(known.values()):
-        return "failed"
-    return "ok" if known["cold"] == len(document["scenes"]) else "degraded"
+    return verdict_state(document["status"], document["absent"], {"report": report})

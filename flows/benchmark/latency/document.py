@@ -20,12 +20,16 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True)
 class Measured:
-    """What a report is made from: the timings, how they came about, and what is absent."""
+    """What a report is made from: the timings, how they came about, and what is absent.
+
+    ``lost`` is the number of scenes of which there is no timing at all.
+    """
 
     timings: tuple[SceneTiming, ...]
     source: str
     machine: Machine
     absent: tuple[str, ...] = ()
+    lost: int = 0
 
     def of(self, mode: Mode, scene: str | None = None) -> list[SceneTiming]:
         """Return the timings of one mode, of all scenes or of one."""
@@ -42,6 +46,7 @@ def latency_document(measured: Measured) -> Json:
     scenes = [_scene(measured, name) for name in measured.scenes]
     return {
         "schema": SCHEMA,
+        "status": _status(scenes, measured.lost),
         "made": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         "source": measured.source,
         "machine": dataclasses.asdict(measured.machine),
@@ -55,6 +60,14 @@ def latency_document(measured: Measured) -> Json:
         "steps": _steps_over_scenes(measured),
         "paper": _paper(),
     }
+
+
+def _status(scenes: list[Json], lost: int) -> str:
+    """Return ok if all scenes have a cold total, degraded if some have, failed if none has."""
+    known = [scene for scene in scenes if scene["modes"]["cold"]["count"]]
+    if not known:
+        return "failed"
+    return "ok" if len(known) == len(scenes) + lost else "degraded"
 
 
 def _scene(measured: Measured, name: str) -> Json:

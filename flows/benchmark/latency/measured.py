@@ -16,6 +16,7 @@ from flows.benchmark.latency.timing import SceneTiming
 from flows.benchmark.latency.wire import timing_from_json
 from flows.collection.scene_job import scene_order
 from flows.scene_run import SceneRequest
+from storage.redact import redact
 
 Engine = Literal["prefect", "local"]
 
@@ -92,7 +93,7 @@ def in_fresh_process(
             check=False,
         )
     if ended.returncode:
-        tail = said.read_text(errors="replace")[-_TAIL:].strip()
+        tail = redact(said.read_text(errors="replace"))[-_TAIL:].strip()
         raise MeasurementFailed(
             f"{request.name}: its process ended with code {ended.returncode}; it said last: {tail}"
         )

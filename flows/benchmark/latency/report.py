@@ -11,7 +11,12 @@ from typing import Any
 from flows.benchmark.latency.document import Measured, latency_document
 from flows.benchmark.latency.machine import this_machine
 from flows.benchmark.latency.markdown import latency_markdown
-from flows.benchmark.latency.measured import Engine, Measurement, measured_timings
+from flows.benchmark.latency.measured import (
+    Engine,
+    Measurement,
+    MeasurementFailed,
+    measured_timings,
+)
 from flows.benchmark.latency.page import latency_page
 from flows.benchmark.latency.parquet import latency_parquet
 from flows.benchmark.latency.recorded import recorded_timings
@@ -22,6 +27,9 @@ from storage import Store
 
 Json = dict[str, Any]
 Tell = Callable[[str], None]
+
+NAMED = 6
+"""Unknown steps that are named; --json names all."""
 
 FILES = ("latency.parquet", "latency.md", "latency.html")
 
@@ -55,7 +63,9 @@ def write_latency_report(
     Raises:
         WrongUse, BadInput, UnreadableInput: a path names no scene that can be read.
         StoreMissing: there is nothing to read.
-        MeasurementFailed: a process that ran a scene died.
+        OSError: the report cannot be written.
+
+    A scene whose process died is told under what is absent.
     """
     found = find_scenes([Path(p) for p in paths], options.packages, options.preset)
     folder = Path(out)
@@ -80,14 +90,19 @@ def _measure(found: FoundScenes, how: Measurement, tell: Tell) -> Measured:
     load, machine = os.getloadavg()[0], this_machine()
     for request in found.requests:
         tell(f"running {request.name} cold, warm and cached, {how.repeat} times")
-        timings += measured_timings(request, how)
+        try:
+            timings += measured_timings(request, how)
+        except MeasurementFailed as error:  # one scene stops no other
+            found.unreadable.append(str(error))
+            tell(str(error))
     times = "once" if how.repeat == 1 else f"{how.repeat} times"
     source = (
         f"Every scene was run {times} from an empty store with the {how.engine} engine, "
         "nothing else of this report at the same time. Before, the machine had a load of "
         f"{load:.1f} on {machine.cores} cores."
     )
-    return Measured(tuple(timings), source, machine, tuple(_absent(found, timings)))
+    absent = tuple(_absent(found, timings))
+    return Measured(tuple(timings), source, machine, absent, len(found.unreadable))
 
 
 def _read(found: FoundScenes, store: Store, repeat: int, tell: Tell) -> Measured:
@@ -104,7 +119,8 @@ def _read(found: FoundScenes, store: Store, repeat: int, tell: Tell) -> Measured
         "warm seconds and the clock of whole processes: they are measured only by --run",
         *_absent(found, timings),
     ]
-    return Measured(tuple(timings), source, this_machine(), tuple(absent))
+    lost = len(found.unreadable)
+    return Measured(tuple(timings), source, this_machine(), tuple(absent), lost)
 
 
 def _absent(found: FoundScenes, timings: list[SceneTiming]) -> Iterable[str]:
@@ -112,12 +128,13 @@ def _absent(found: FoundScenes, timings: list[SceneTiming]) -> Iterable[str]:
     yield from (f"{reason} (not measured)" for reason in found.unreadable)
     for request in found.requests:
         own = [timing for timing in timings if timing.scene == request.name]
+        if not own:
+            continue
         for timing in own:
             if timing.missing:
-                names = ", ".join(timing.missing)
                 yield (
-                    f"{request.name}: no {timing.mode} total, nothing is known of {names}; it is "
-                    "left out of what is said over scenes"
+                    f"{request.name}: no {timing.mode} total, nothing is known of "
+                    f"{_listed(timing.missing)}; it is left out of what is said over scenes"
                 )
         if not any(timing.mode == "cached" for timing in own):
             yield f"{request.name}: no cached seconds, a rerun would have something to do"
@@ -127,6 +144,11 @@ def _absent(found: FoundScenes, timings: list[SceneTiming]) -> Iterable[str]:
                 f"{request.name}: its cold seconds were put together from {len(runs)} runs, so no "
                 "clock went over all of them"
             )
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    rest = len(names) - NAMED
+    return ", ".join(names[:NAMED]) + (f" and {rest} more steps" if rest > 0 else "")
 
 
 def _replace(path: Path, content: bytes) -> None:

@@ -129,7 +129,8 @@ def paper_table(document: Json) -> Table:
     theirs = document["paper"]
     return Table(
         "The paper's scenes",
-        f"{theirs['source']}, on {theirs['hardware']}; {theirs['objects']}.",
+        f"Seconds without rendering from {theirs['source']}, on {theirs['hardware']}; "
+        f"{theirs['objects']}.",
         ("scene", "LiteReality", "GARDEN (paper)", "ratio"),
         tuple(
             (s["scene"], f"{s['litereality_s']:g}", f"{s['garden_s']:g}", f"{s['ratio']:.1f}")
@@ -152,9 +153,10 @@ def ours_table(document: Json) -> Table:
     ]
     return Table(
         "Our scenes, to stand beside them",
-        f"On {hardware(document)} Not a like-for-like comparison: the scenes, photos, "
-        "number of objects, backends and hardware differ. Seconds an object divide the scene's "
-        "by its objects; own steps are the median over its objects of what each adds by itself.",
+        f"Cold seconds without rendering, on {hardware(document)} Not a like-for-like "
+        "comparison: the scenes, photos, number of objects, backends and hardware differ. Seconds "
+        "an object divide the scene's by its objects; own steps are the median "
+        "over its objects of what each adds by itself.",
         ("scene", "objects", "cold", "cold an object", "own steps an object"),
         tuple(rows),
     )

@@ -9,7 +9,7 @@ from typing import Any
 
 from flows.benchmark.latency.tables import Table, ours_table, paper_table, scene_table, step_table
 from flows.benchmark.latency.timing import DEFINITIONS
-from flows.command import EXIT_OK, print_json, say
+from flows.command import EXIT_OF_STATUS, print_json, say
 from flows.command.store_option import store_address
 from flows.wrong_use import WrongUse
 
@@ -26,7 +26,9 @@ DEFINED = "\n".join(
 def configure(name: str, parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.epilog = (
-        "Rendering, which only reports and evaluations need, is left out of the totals:\n" + DEFINED
+        "Rendering, which only reports and evaluations need, is left out of the totals:\n"
+        + DEFINED
+        + "\nExit code 3 if some scenes lack a step, 1 if all do."
     )
     parser.add_argument(
         "captures", nargs="*", type=Path, metavar="COLLECTION|CAPTURE", help="what to measure"
@@ -68,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
         print_json(document)
     else:
         print(report_text(document))
-    return EXIT_OK
+    return EXIT_OF_STATUS[document["status"]]
 
 
 def make_report(options: argparse.Namespace) -> Json:

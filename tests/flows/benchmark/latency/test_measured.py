@@ -10,6 +10,7 @@ import pytest
 
 from flows.benchmark.latency import measured
 from flows.benchmark.latency.measured import Measurement, MeasurementFailed, measured_timings
+from flows.benchmark.latency.report import LatencyOptions, write_latency_report
 from flows.benchmark.latency.scene_process import StepClock, executed_timing
 from flows.benchmark.latency.timing import SceneTiming, StepTiming
 from flows.benchmark.latency.wire import timing_from_json, timing_to_json
@@ -96,3 +97,23 @@ def test_a_process_that_dies_is_told_with_what_it_said_last(
     room.mkdir()
     with pytest.raises(MeasurementFailed, match=r"(?s)desk: .* not finished right after"):
         measured.in_fresh_process("rerun", scene, 1, Measurement(tmp_path), room)
+
+
+def test_a_scene_whose_process_died_stops_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    request(tmp_path, "desk", ())
+    request(tmp_path, "hall", ())
+    done = StepTiming("hall", "", "ingest", "cold", 1, Seconds(compute=3.0), None, 5.0, 8.0)
+
+    def measure(wanted: SceneRequest, how: Measurement) -> list[SceneTiming]:
+        if wanted.name == "desk":
+            raise MeasurementFailed("desk: its process ended with code -9; it said last: ")
+        return [SceneTiming("hall", "cold", 1, (), (done,))]
+
+    monkeypatch.setattr("flows.benchmark.latency.report.measured_timings", measure)
+    options = LatencyOptions(execute=True)
+    document = write_latency_report([tmp_path / "captures"], tmp_path / "out", "", options)
+    assert [scene["scene"] for scene in document["scenes"]] == ["hall"]
+    assert document["over_scenes"]["cold"]["p50_s"] == 3.0
+    assert any("desk: its process ended with code -9" in line for line in document["absent"])

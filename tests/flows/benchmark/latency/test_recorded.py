@@ -86,6 +86,7 @@ def test_a_scene_with_an_unknown_step_has_no_total_and_says_which(
     assert hall["missing"] == [] and hall["modes"]["cold"]["p50_s"] > 0
     assert document["over_scenes"]["cold"]["count"] == 1
     assert document["over_scenes"]["cold"]["p50_s"] == hall["modes"]["cold"]["p50_s"]
+    assert document["status"] == "degraded"
     absent = "\n".join(document["absent"])
     assert "desk: no cold total, nothing is known of label_points[mug]" in absent
     assert "warm seconds" in absent and "desk: no cached seconds" in absent
@@ -170,6 +171,10 @@ def test_the_command_prints_the_same_numbers_and_writes_three_files(
     assert written == {"latency.parquet", "latency.md", "latency.html"}
     assert main([*arguments, "--store", store.address]) == 0
     text = capsys.readouterr().out
+    request(tmp_path, "hall")
+    assert main([*arguments, "--store", store.address]) == 3  # nothing is known of the hall
+    nothing = [*arguments[:2], str(tmp_path / "captures" / "hall"), *arguments[3:]]
+    assert main([*nothing, "--store", store.address]) == 1
     assert "Darwin-BedRoom" in text and "RTX A6000" in text and "desk" in text
 
 
