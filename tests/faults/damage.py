@@ -50,7 +50,8 @@ class Damage:
     def _changed(self, data: bytes) -> bytes:
         if self.kind == "flip":
             changed = bytearray(data)
-            changed[self.at // 8] ^= 1 << (self.at % 8)
+            at = self.at % (8 * len(data))  # a record that was made again may be shorter
+            changed[at // 8] ^= 1 << (at % 8)
             return bytes(changed)
         if self.kind == "cut":
             return data[: self.at]
