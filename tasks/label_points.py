@@ -34,7 +34,7 @@ def _weights(config: LabelPoints, **_others: object) -> dict[str, str | Path]:
 
 @step(
     version=1,
-    packages=("numpy", "scipy", "trimesh"),
+    packages=("numpy", "scipy", "trimesh", "torch", "safetensors"),
     weights=_weights,
     skip=("config.weights",),
 )
