@@ -18,6 +18,7 @@ from flows.benchmark.orchestration.simulated_job import simulated_orders
 from flows.benchmark.orchestration.simulated_scene import steps_of
 from flows.collection.definition import Collection
 from flows.collection.run import CollectionResult, Options, RowEvent, run_jobs
+from flows.collection.state import STATE
 from storage import Store
 from tasks.step import Budget
 
@@ -71,7 +72,7 @@ class Restart:
 
 @dataclass(frozen=True)
 class ScaleResult:
-    """All that was measured."""
+    """All that was measured. ``state_bytes`` is the size of the collection's state file."""
 
     options: ScaleOptions
     started: float
@@ -80,6 +81,7 @@ class ScaleResult:
     samples: list[Sample]
     store: dict[str, Growth]
     restart: Restart
+    state_bytes: int
     server: ServerGrowth | None = None
 
 
@@ -117,7 +119,8 @@ def measure_scale(
     say("again, over finished scenes")
     restart = _restart(options, folder)
     store = growth_by_part(folder / "store")
-    return ScaleResult(options, started, wall, finished, samples, store, restart, grown)
+    state = (folder / "out" / STATE).stat().st_size
+    return ScaleResult(options, started, wall, finished, samples, store, restart, state, grown)
 
 
 def run_scenes(

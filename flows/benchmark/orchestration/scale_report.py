@@ -8,6 +8,7 @@ from statistics import mean, median
 
 from flows.benchmark.measure import Measure
 from flows.benchmark.orchestration.growth import Growth
+from flows.benchmark.orchestration.plan_ahead import plan_section
 from flows.benchmark.orchestration.report import Row, Section
 from flows.benchmark.orchestration.sampling import Sample
 from flows.benchmark.orchestration.scale import FinishedScene, ScaleResult, ServerGrowth
@@ -89,7 +90,7 @@ def scale_sections(result: ScaleResult) -> list[Section]:
     if result.server is not None:
         title = f"What the Prefect server grew by (settings: {options.profile})"
         sections.append(Section(title, SERVER_METHOD, _server_rows(result, result.server)))
-    return sections
+    return [*sections, plan_section(result)]
 
 
 def _claims(result: ScaleResult, blocks: list[Block]) -> tuple[Measure, ...]:

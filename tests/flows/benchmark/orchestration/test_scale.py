@@ -54,7 +54,7 @@ def test_a_server_counts_what_it_was_told(tmp_path: Path) -> None:
     assert result.server.rows["events"] == 0  # lean
     assert result.server.cpu_s > 0
     titles = [section.title for section in scale_sections(result)]
-    assert len(titles) == 3
+    assert len(titles) == 4
 
 
 def test_a_scene_that_failed_counts_for_nothing(
@@ -80,7 +80,7 @@ def measured(scene_s: list[float], ours_mb: list[int], restart_s: float = 1.0) -
     options = ScaleOptions(len(scene_s), 5, "local")
     restart = Restart(restart_s, 0, options.steps)
     store = {"objects": Growth(10, 5, 1000, 4096), "actions": Growth(2, 1, 100, 4096)}
-    return ScaleResult(options, 0.0, float(len(scene_s)), finished, samples, store, restart)
+    return ScaleResult(options, 0.0, float(len(scene_s)), finished, samples, store, restart, 600)
 
 
 def test_the_last_block_is_held_against_the_first() -> None:
@@ -106,6 +106,16 @@ def test_the_stores_growth_is_summed() -> None:
     rows = scale_sections(measured([1.0] * 4, [100] * 4))[1].rows
     assert [row["part"] for row in rows] == ["objects", "actions", "all"]
     assert (rows[-1]["files"], rows[-1]["folders"]) == (12, 6)
+
+
+def test_a_hundred_thousand_scenes_take_as_much_each() -> None:
+    section = scale_sections(measured([1.0] * 4, [100] * 4, restart_s=2.0))[-1]
+    rows = {row["what"]: row["100000 scenes"] for row in section.rows}
+    assert rows["wall-clock time here"] == "27.8 h"
+    assert rows["restart over finished scenes"] == "833 min"
+    assert rows["inodes of the store"] == "0.45 million"
+    assert rows["collection.json"] == "15 MB"
+    assert "database of the Prefect server" not in rows
 
 
 def test_growth_counts_files_folders_and_bytes(tmp_path: Path) -> None:
