@@ -12,8 +12,8 @@ from garden_models.disentanglement.network.checkpoint import Checkpoint, load_ch
 from garden_models.disentanglement.network.predict import predict
 from garden_models.disentanglement.network.shipped import DIGEST, checkpoint_file
 from garden_models.disentanglement.protocol import Crop, PlacedMesh
-from garden_models.disentanglement.training.crop import sample_triangles
 from garden_models.disentanglement.training.pair import Condition
+from garden_models.disentanglement.triangles import sample_triangles
 from garden_models.progress import Progress, silent
 from garden_models.scene import BadInput
 
@@ -71,4 +71,4 @@ def condition_of(mesh: PlacedMesh) -> Condition:
             "is the scene in metres? Give cameras or a length with the right scale"
         )
     points, which = sample_triangles(corners, SAMPLES, np.random.default_rng(0))
-    return Condition(points, corners[which])
+    return Condition(points, which, corners)

@@ -13,10 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import cKDTree
 
-from garden_models.disentanglement.network.condition_distance import (
-    normals,
-    to_condition,
-)
+from garden_models.disentanglement.network.condition_distance import Surface
 from garden_models.disentanglement.network.config import NetworkConfig
 from garden_models.disentanglement.network.surroundings import (
     FINE,
@@ -31,9 +28,10 @@ from garden_models.disentanglement.network.surroundings import (
     strongest_layer,
 )
 from garden_models.disentanglement.training.pair import Condition
+from garden_models.disentanglement.triangles import normals
 
-OWN = 15
-"""Features of a point by itself: place, and how it lies to the condition."""
+OWN = 18
+"""Features of a point by itself: place, how it lies to the condition, place in the crop."""
 AROUND = 21
 """Features that a point has from the nearest context point."""
 OBJECT = 8
@@ -41,6 +39,8 @@ OBJECT = 8
 NEAR = 0.15
 """Of the object's size: how near to the condition a cluster's points count as near."""
 LEAST_DISTANCE = 1e-3
+EDGE = 0.005
+"""Share of the context beyond the crop's bounds on each side: strays do not move them."""
 
 
 @dataclass(frozen=True)
@@ -59,10 +59,13 @@ class Frame:
 class Context:
     """What the network looks at: context points with features, tokens among them, condition.
 
-    ``token`` holds indices of context points, ``assigned`` each context point's token.
+    ``bounds`` are the crop's corners in metres. ``token`` holds indices of context points,
+    ``assigned`` each context point's token.
     """
 
     frame: Frame
+    surface: Surface
+    bounds: Float[np.ndarray, "2 3"]
     points: Float[np.ndarray, "c 3"]
     around: Float[np.ndarray, "c a"]
     features: Float[np.ndarray, "c f"]
@@ -77,13 +80,17 @@ def describe_context(
     """Describe context points (metres) and the condition."""
     frame = frame_of(condition)
     relative = frame.relative(points)
-    own = own_features(points, condition, frame)
+    bounds = np.quantile(points, [EDGE, 1 - EDGE], axis=0)
+    surface = Surface(condition)
+    own = own_features(points, surface, frame, bounds)
     around = _around(relative, own)
     token = farthest_points(relative, config.scene_tokens)
     _, assigned = cKDTree(relative[token]).query(relative)
     features = np.concatenate([own, around], axis=1)
     return Context(
         frame,
+        surface,
+        bounds,
         relative,
         around,
         features.astype(np.float32),
@@ -93,12 +100,10 @@ def describe_context(
     )
 
 
-def describe_points(
-    points: Float[np.ndarray, "n 3"], condition: Condition, context: Context
-) -> Float[np.ndarray, "n f"]:
+def describe_points(points: Float[np.ndarray, "n 3"], context: Context) -> Float[np.ndarray, "n f"]:
     """Describe points (metres) to ask about; each by itself and its nearest context point."""
     _, nearest = cKDTree(context.points).query(context.frame.relative(points))
-    own = own_features(points, condition, context.frame)
+    own = own_features(points, context.surface, context.frame, context.bounds)
     return np.concatenate([own, context.around[nearest]], axis=1).astype(np.float32)
 
 
@@ -109,13 +114,18 @@ def frame_of(condition: Condition) -> Frame:
 
 
 def own_features(
-    points: Float[np.ndarray, "n 3"], condition: Condition, frame: Frame
-) -> Float[np.ndarray, "n 15"]:
-    """Return place, distance to the condition (plain and log), side, direction and normal."""
-    lying = to_condition(points, condition)
+    points: Float[np.ndarray, "n 3"],
+    surface: Surface,
+    frame: Frame,
+    bounds: Float[np.ndarray, "2 3"],
+) -> Float[np.ndarray, "n 18"]:
+    """Return place, distance to the condition (plain and log), side, direction, normal, and the
+    place in the crop, whose relaxed box is about the object.
+    """
+    lying = surface.ask(points)
     distance = lying.distance / frame.size
     side = np.einsum("ni,ni->n", lying.towards, lying.normal)
-    low = (condition.box[1, 1] - points[:, 1]) / frame.size
+    low = (surface.condition.box[1, 1] - points[:, 1]) / frame.size
     return np.column_stack(
         [
             frame.relative(points),
@@ -127,6 +137,9 @@ def own_features(
             low,
             np.full(len(points), np.log10(frame.size) + 0.5),
             side * np.minimum(distance, 1.0),
+            np.clip(
+                (points - bounds.mean(axis=0)) / np.maximum(np.ptp(bounds, axis=0), 1e-9), -1, 1
+            ),
         ]
     )
 
@@ -171,7 +184,7 @@ def _condition_features(
     return np.column_stack(
         [
             relative[chosen],
-            normals(condition.triangles[chosen]),
+            normals(condition.triangles)[condition.on[chosen]],
             np.log10(distance + LEAST_DISTANCE) + 1.5,
             np.full(len(chosen), np.log10(frame.size) + 0.5),
         ]

@@ -49,7 +49,7 @@ def predict(
         tokens, places = model.tokens(*context_tensors(context, device))
         for start in range(0, len(points), chunk):
             progress(start / len(points), f"{len(points)} points")
-            asked = describe_points(points[start : start + chunk], condition, context)
+            asked = describe_points(points[start : start + chunk], context)
             logits = model(torch.from_numpy(asked)[None].to(device), tokens, places)
             probability[start : start + chunk] = logits[0].sigmoid().cpu().numpy()
     return probability

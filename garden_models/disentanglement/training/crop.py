@@ -19,6 +19,7 @@ from jaxtyping import Bool, Float, Int
 from garden_models.disentanglement.training.pair import Condition, LabelledCloud
 from garden_models.disentanglement.training.pairs_config import CropConfig
 from garden_models.disentanglement.training.scenes.room import Room
+from garden_models.disentanglement.triangles import sample_triangles
 
 PRESSED = 0.0008
 """Metres within which a resting base and its carrier are one surface."""
@@ -86,7 +87,7 @@ def cut(
     if cloud.label.mean() < config.least_positive:
         return None
     chosen, on = sample_triangles(own, config.samples, rng)
-    return cloud, Condition(chosen, own[on])
+    return cloud, Condition(chosen, on, own)
 
 
 def expanded_box(
@@ -99,21 +100,6 @@ def expanded_box(
     low = low - np.array([side[0], rng.uniform(*config.above) * size, side[1]])
     high = high + np.array([side[2], rng.uniform(*config.below) * size, side[3]])
     return low, high
-
-
-def sample_triangles(
-    corners: Float[np.ndarray, "t 3 3"], count: int, rng: np.random.Generator
-) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, " n"]]:
-    """Draw points from triangles in proportion to area; return them and their triangles."""
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    cumulated = np.cumsum(area)
-    which = np.searchsorted(cumulated, rng.uniform(0, cumulated[-1], count), side="right")
-    which = np.minimum(which, len(corners) - 1)
-    u, v = rng.uniform(0, 1, (2, count, 1))
-    outside = u + v > 1
-    u, v = np.where(outside, 1 - u, u), np.where(outside, 1 - v, v)
-    return a[which] + u * (b - a)[which] + v * (c - a)[which], which
 
 
 def _fill_box(

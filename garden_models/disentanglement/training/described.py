@@ -39,7 +39,7 @@ def describe_shard(
         pair = shard.pair(k)
         points = pair.cloud.points.astype(np.float64)
         context = describe_context(points[:CONTEXT_POINTS], pair.condition, config)
-        rest = describe_points(points[CONTEXT_POINTS:], pair.condition, context)
+        rest = describe_points(points[CONTEXT_POINTS:], context)
         features.append(np.concatenate([context.features, rest]).astype(np.float16))
         token.append(context.token.astype(np.int16))
         assigned.append(context.assigned.astype(np.int16))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 CONTEXT_POINTS = 2048
 """The first points of a pair: what a network may look at; the rest are only asked about."""
@@ -14,13 +14,14 @@ CONTEXT_POINTS = 2048
 
 @dataclass(frozen=True)
 class Condition:
-    """Samples of the placed object mesh, each with the triangle that it lies on, metres.
+    """The placed object mesh: points drawn from it, and its triangles, metres.
 
-    Triangles are counter-clockwise from outside.
+    ``on`` is the triangle of each point; triangles are counter-clockwise from outside.
     """
 
     points: Float[np.ndarray, "k 3"]
-    triangles: Float[np.ndarray, "k 3 3"]
+    on: Int[np.ndarray, " k"]
+    triangles: Float[np.ndarray, "t 3 3"]
 
     @property
     def box(self) -> Float[np.ndarray, "2 3"]:
@@ -64,7 +65,10 @@ class Pair:
 
 @dataclass(frozen=True)
 class PairShard:
-    """Many pairs of one split, stacked: ``p`` pairs of ``n`` points and ``k`` samples."""
+    """Many pairs of one split, stacked: ``p`` pairs of ``n`` points and ``k`` samples.
+
+    Pair i owns ``triangles[first[i]:first[i + 1]]``.
+    """
 
     SCHEMA: ClassVar[str] = "garden.PairShard/1"
     split: str
@@ -72,7 +76,9 @@ class PairShard:
     points: Float[np.ndarray, "p n 3"]
     label: Bool[np.ndarray, "p n"]
     samples: Float[np.ndarray, "p k 3"]
-    triangles: Float[np.ndarray, "p k 3 3"]
+    on: Int[np.ndarray, "p k"]
+    triangles: Float[np.ndarray, "t 3 3"]
+    first: Int[np.ndarray, " p_plus_1"]
     support_y: Float[np.ndarray, " p"]
     size: Float[np.ndarray, " p"]
     shapes: tuple[str, ...]
@@ -85,7 +91,11 @@ class PairShard:
         """Return one pair."""
         return Pair(
             LabelledCloud(self.points[index], self.label[index]),
-            Condition(self.samples[index], self.triangles[index]),
+            Condition(
+                self.samples[index],
+                self.on[index],
+                self.triangles[self.first[index] : self.first[index + 1]],
+            ),
             float(self.support_y[index]),
             float(self.size[index]),
             self.shapes[index],
@@ -103,7 +113,9 @@ def stacked(pairs: list[Pair], split: str, augmented: bool) -> PairShard:
         np.stack([p.cloud.points for p in pairs]).astype(np.float32),
         np.stack([p.cloud.label for p in pairs]),
         np.stack([p.condition.points for p in pairs]).astype(np.float32),
-        np.stack([p.condition.triangles for p in pairs]).astype(np.float32),
+        np.stack([p.condition.on for p in pairs]).astype(np.int32),
+        np.concatenate([p.condition.triangles for p in pairs]).astype(np.float32),
+        np.cumsum([0, *(len(p.condition.triangles) for p in pairs)]),
         np.array([p.support_y for p in pairs], np.float32),
         np.array([p.size for p in pairs], np.float32),
         tuple(p.shape for p in pairs),

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from garden_models.disentanglement.network.describe import OWN
 
-_VECTORS = (0, 6, 9, OWN + 15)
+_VECTORS = (0, 6, 9, 15, OWN + 15)
 """Columns at which three components of a place or direction begin (``describe``)."""
 _EXTENT = OWN + 18
 _CONDITION_VECTORS = (0, 3)

@@ -45,13 +45,13 @@ class VirtualScan:
     on: bool = True
     views: tuple[int, int] = (25, 45)
     least_views: int = 2
-    image_px: int = 96
+    image_px: int = 128
     field_of_view_deg: float = 60.0
     distance: tuple[float, float] = (0.8, 1.8)
     """Of the cloud's diagonal."""
     elevation_deg: tuple[float, float] = (5.0, 65.0)
     arc_deg: tuple[float, float] = (120.0, 360.0)
-    depth_tolerance: float = 0.05
+    depth_tolerance: float = 0.025
 
 
 @dataclass(frozen=True)

@@ -27,4 +27,4 @@ def jitter_mesh(
     def moved(points: np.ndarray) -> np.ndarray:
         return np.asarray((points - centre) @ linear.T + centre + shift)
 
-    return Condition(moved(condition.points), moved(condition.triangles))
+    return Condition(moved(condition.points), condition.on, moved(condition.triangles))

@@ -9,7 +9,10 @@ from scipy.spatial import cKDTree
 from garden_models.disentanglement.training.augmentations.config import ThinParts
 from garden_models.disentanglement.training.pair import LabelledCloud
 
-NEIGHBOURS = 24
+NEIGHBOURS = 32
+MOST_ASKED = 2048
+"""Points among which neighbours are sought: so few that those within the radius are not more
+than ``NEIGHBOURS`` by much."""
 
 
 def deform_thin_parts(
@@ -41,7 +44,7 @@ def slender(
 
     Linearity is (a - b) / a for the two largest standard deviations a and b.
     """
-    chosen = points if len(points) <= 4096 else points[:: len(points) // 4096 + 1]
+    chosen = points[:: -(-len(points) // MOST_ASKED)]
     tree = cKDTree(chosen)
     distance, index = tree.query(points, k=NEIGHBOURS, distance_upper_bound=radius)
     found = np.isfinite(distance)
