@@ -19,6 +19,8 @@ from garden_models.disentanglement.triangles import (
 SAMPLES = 12_288
 CANDIDATES = 6
 """Triangles compared for each point: those of its nearest samples."""
+ALIKE = 1e-4
+"""Squared distances that differ by less than this share are to one edge."""
 
 
 @dataclass(frozen=True)
@@ -56,25 +58,32 @@ class Surface:
         return normals(self.condition.triangles)
 
     def ask(self, points: Float[np.ndarray, "n 3"]) -> ToCondition:
-        """Return how each point lies to the nearest of the triangles."""
+        """Return how each point lies to the nearest of the triangles.
+
+        Nearest to an edge, the normal is the mean of the faces'.
+        """
         triangles = self.condition.triangles
         tree, on = self._samples
         _, index = tree.query(points, k=CANDIDATES)
         candidates = on[index]
-        best = np.full(len(points), np.inf)
-        nearest, chosen = np.zeros((len(points), 3)), np.zeros(len(points), np.int64)
+        best = np.full(len(points), np.finfo(float).max)
+        nearest, normal = np.zeros((len(points), 3)), np.zeros((len(points), 3))
         for k in range(CANDIDATES):
             # Neighbouring samples often lie on one triangle: ask it once.
             new = np.flatnonzero((candidates[:, k : k + 1] != candidates[:, :k]).all(axis=1))
             which = candidates[new, k]
             foot = closest_on_triangles(points[new], triangles[which])
             squared = np.square(points[new] - foot).sum(axis=1)
-            better = squared < best[new]
+            slack = ALIKE * best[new]
+            better, alike = squared < best[new] - slack, np.abs(squared - best[new]) <= slack
             at = new[better]
-            best[at], nearest[at], chosen[at] = squared[better], foot[better], which[better]
+            best[at], nearest[at] = squared[better], foot[better]
+            normal[at] = self._normals[which[better]]
+            normal[new[alike]] += self._normals[which[alike]]
         distance = np.sqrt(best)
         towards = (points - nearest) / np.maximum(distance, 1e-9)[:, None]
-        return ToCondition(distance, towards, self._normals[chosen])
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        return ToCondition(distance, towards, normal / np.maximum(length, 1e-9))
 
 
 def to_condition(points: Float[np.ndarray, "n 3"], condition: Condition) -> ToCondition:
