@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 from pathlib import Path
 
 from flows.command import EXIT_FAILED, EXIT_OK, print_json, say
@@ -11,6 +12,7 @@ from flows.command.store_option import open_store
 DESCRIPTION = """\
   garden train point-classifier --preset cpu       which scene points are an object's
   garden train point-classifier --gallery FILE     what its augmentations do, as a page
+  garden train point-classifier --fit-stereo DIR   our stereo's noise, from a capture with truth
 
 Writes OUT/point_classifier.safetensors with record.json and record.html. Everything is kept in
 the store: data by shards, the training by checkpoints. A training that was stopped or killed
@@ -35,6 +37,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--gallery", metavar="FILE", type=Path, help="only write the page of augmentations"
     )
+    parser.add_argument(
+        "--fit-stereo",
+        metavar="FOLDER",
+        type=Path,
+        help="only fit the stereo-noise augmentation to a capture like tests/scenes/corner",
+    )
     parser.add_argument("--engine", choices=("prefect", "local"), default="prefect")
 
 
@@ -45,6 +53,11 @@ def run(options: argparse.Namespace) -> int:
 
         write_gallery(options.gallery, options.preset)
         say(f"wrote {options.gallery}")
+        return EXIT_OK
+    if options.fit_stereo is not None:
+        from flows.training.stereo_residuals import fitted_stereo_noise
+
+        print_json(dataclasses.asdict(fitted_stereo_noise(options.fit_stereo, open_store(options))))
         return EXIT_OK
     return _train(options)
 
