@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 export PREFECT_SERVER_ANALYTICS_ENABLED = false
 
-.PHONY: install demo test check lint sample clean
+.PHONY: install demo test check lint faults server worker sample clean
 
 install: $(INSTALLED)
 
@@ -33,6 +33,21 @@ lint: install
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+faults: install
+	$(BIN)/python -m tests.faults $(PARTS)
+
+# The two commands of docs/deploy.md: make server, and in another terminal
+# make worker COLLECTION=rooms.toml
+PREFECT_API_URL ?= http://127.0.0.1:4200/api
+
+server: install
+	$(BIN)/prefect server start --host 127.0.0.1
+
+worker: export PREFECT_API_URL := $(PREFECT_API_URL)
+worker: install
+	$(BIN)/python deploy/register.py $(if $(COLLECTION),--collection $(COLLECTION))
+	$(BIN)/prefect worker start --pool garden --type process --limit 1
 
 sample: install
 	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[sample]'
