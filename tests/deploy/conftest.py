@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,7 +61,7 @@ def free_port() -> int:
 
 @contextlib.contextmanager
 def background(command: list[str], environment: dict[str, str], log: Path) -> Iterator[Any]:
-    """Keep a command running in a group of its own; end the whole group afterwards."""
+    """Keep a command running in a group of its own; end it and all that it started afterwards."""
     with log.open("w") as output:
         process = subprocess.Popen(
             command, cwd=ROOT, env=environment, stdout=output, stderr=output, start_new_session=True
@@ -68,11 +69,28 @@ def background(command: list[str], environment: dict[str, str], log: Path) -> It
         try:
             yield process
         finally:
-            for number in (signal.SIGINT, signal.SIGKILL):
+            started = descendants(process.pid)  # a worker's flow runs have groups of their own
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGINT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(6)
+            for pid in (process.pid, *started):
                 with contextlib.suppress(ProcessLookupError):
-                    os.killpg(process.pid, number)
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    process.wait(6)
+                    os.kill(pid, signal.SIGKILL)
+            process.wait()
+
+
+def descendants(pid: int) -> list[int]:
+    """Return the processes that a process started, and those that they started."""
+    children = defaultdict(list)
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            name, fields = path.parent.name, path.read_text().rpartition(")")[2].split()
+            children[int(fields[1])].append(int(name))
+    found = [pid]
+    for parent in found:
+        found += children[parent]
+    return found[1:]
 
 
 def wait_for(what: str, check: Callable[[], Any], seconds: float) -> Any:
