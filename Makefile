@@ -46,7 +46,7 @@ server: install
 
 worker: export PREFECT_API_URL := $(PREFECT_API_URL)
 worker: install
-	$(BIN)/python deploy/register.py $(if $(COLLECTION),--collection $(COLLECTION))
+	$(BIN)/python deploy/register.py $(if $(COLLECTION),--collection "$(COLLECTION)")
 	$(BIN)/prefect worker start --pool garden --type process --limit 1
 
 sample: install
