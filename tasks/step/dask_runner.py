@@ -16,12 +16,11 @@ from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any, Self
 
-from storage import CorruptArtifact, MissingArtifact
 from storage.address import is_remote
 from storage.redact import redact
 from tasks.step import dask_worker
 from tasks.step.execute import Call
-from tasks.step.inputs import each
+from tasks.step.lost_inputs import make_again
 from tasks.step.order import write_order
 from tasks.step.ref import Cancelled, Ref, StepFailed
 from tasks.step.run import RunContext
@@ -94,7 +93,7 @@ class DaskRunner:
         try:
             return self._compute(call)
         except StepFailed as failure:
-            if failure.kind not in _LOST_INPUT or not _made_again(call):
+            if failure.kind not in _LOST_INPUT or not make_again(call.context, call.arguments):
                 raise
         return self._compute(call)
 
@@ -232,21 +231,3 @@ class _Deadline:
 
 def _failed(call: Call, kind: str, reason: str) -> StepFailed:
     return StepFailed(call.step.name, call.label, reason, kind=kind, retryable=True)
-
-
-def _made_again(call: Call) -> bool:
-    """Make the call's lost inputs again with the steps that made them in this run."""
-    context = call.context
-    refs = [ref for value in call.arguments.refs.values() for ref in each(value)]
-    lost = [ref for ref in refs if _is_lost(context, ref)]
-    if not lost or any(ref.object not in context.producers for ref in lost):
-        return False
-    return all(context.producers[ref.object]("corrupt").content == ref.content for ref in lost)
-
-
-def _is_lost(context: RunContext, ref: Ref) -> bool:
-    try:
-        context.store.manifest(ref.object)
-    except (CorruptArtifact, MissingArtifact):
-        return True
-    return False

@@ -7,13 +7,13 @@ import errno
 import random
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from garden_models.scene import BadGeometry, BadInput
-from storage import ActionRecord, Output, StoreError
+from storage import ActionRecord, CorruptArtifact, MissingArtifact, Output, StoreError
 from storage.redact import redact
 from tasks.step.budget import Held, is_holding
 from tasks.step.compute import Done, compute
@@ -209,7 +209,7 @@ def _make(call: Call, parts: KeyParts, why: Why, waited: float, gpus: tuple[str,
 
 
 def _with_retries(call: Call, gpus: tuple[str, ...]) -> tuple[Done, int]:
-    """Compute; try again after faults that may pass, and once after a damaged input."""
+    """Compute; try again after faults that may pass."""
     attempt = 1
     while True:
         try:
@@ -228,10 +228,24 @@ def _compute(call: Call, gpus: tuple[str, ...]) -> Done:
         call.context.emit(_event(call, "progress", share=share, doing=doing))
 
     if call.step.spec.isolated and call.context.isolate:
-        from tasks.step.isolate import compute_isolated
-
-        return compute_isolated(call.context, call.step, call.arguments, call.label, report, gpus)
+        return _compute_isolated(call, report, gpus)
     return compute(call.context, call.step, call.arguments, report)
+
+
+def _compute_isolated(
+    call: Call, report: Callable[[float, str], None], gpus: tuple[str, ...]
+) -> Done:
+    """Compute in a child process, once more if it found an input that was damaged or gone."""
+    from tasks.step.isolate import compute_isolated
+    from tasks.step.lost_inputs import make_again
+
+    order = call.context, call.step, call.arguments, call.label
+    try:
+        return compute_isolated(*order, report, gpus)
+    except (CorruptArtifact, MissingArtifact):
+        if not make_again(call.context, call.arguments):
+            raise
+    return compute_isolated(*order, report, gpus)
 
 
 def is_transient(error: BaseException) -> bool:

@@ -14,8 +14,9 @@ from typing import Any
 import pytest
 
 from storage import Store
-from tasks.step import RunContext, StepEvent, StepFailed, load, run_context
+from tasks.step import Ref, RunContext, StepEvent, StepFailed, load, run_context
 from tests.s3_server import BUCKET, S3Server
+from tests.storage.media import behind, files_of
 from tests.tasks.step.toy import Numbers, Scaling, apart, dawdle, hoard, in_run, make
 
 
@@ -88,7 +89,7 @@ def test_the_memory_limit_holds(store: Store) -> None:
 PARENT = """
 import signal, sys
 from storage import Store
-from tasks.step import RunContext, run_context
+from tasks.step import Ref, RunContext, run_context
 from tests.tasks.step.toy import dawdle
 signal.signal(signal.SIGINT, getattr(signal, sys.argv[4]))
 with run_context(RunContext(Store.open(sys.argv[1]), "room")):
@@ -150,7 +151,7 @@ def test_single_flight_between_processes_and_take_over(store: Store, tmp_path: P
     code = (
         "import sys, time; from storage import Store\n"
         "store = Store.open(sys.argv[1])\n"
-        "from tasks.step import RunContext, run_context\n"
+        "from tasks.step import Ref, RunContext, run_context\n"
         "from tests.tasks.step import toy\n"
         "key = toy.make._call(RunContext(store, 'room'), {'count': 7}, None)\n"
         "key = toy.make.key_parts(key.arguments).key\n"
@@ -189,3 +190,27 @@ def test_a_child_works_in_a_store_in_a_bucket(s3: S3Server) -> None:
     assert in_run(store, lambda: apart(make(3), Scaling()))[0].outcome == "cached"
     with pytest.raises(StepFailed, match="a sentence"):
         in_run(store, lambda: apart(make(3), Scaling(note="bad")))
+
+
+@pytest.mark.parametrize("damage", ["changed", "removed"])
+def test_hit_means_verified_an_input_that_a_child_finds_damaged_is_made_again(
+    store: Store, damage: str
+) -> None:
+    def body() -> Ref:
+        value = make(3)
+        there = behind(store)
+        for name in files_of(store, value.object):
+            if name.rpartition("/")[2].startswith("c."):
+                there.put(name, there.get(name)[::-1])
+            elif damage == "removed":
+                there.delete(name)
+        return apart(value, Scaling())
+
+    ref, run = in_run(store, body)
+    assert store.read(ref.object, Numbers).values.tolist() == [1.0, 2.0, 3.0]
+    assert [(e.step, e.outcome) for e in run.outcomes] == [
+        ("make", "executed"),
+        ("make", "executed"),
+        ("apart", "executed"),
+    ]
+    assert store.verify("full") == []
