@@ -54,7 +54,7 @@ class Damage:
             changed[at // 8] ^= 1 << (at % 8)
             return bytes(changed)
         if self.kind == "cut":
-            return data[: self.at]
+            return data[: min(self.at, len(data) - 1)]
         return data + b"\0" if self.kind == "longer" else b""
 
 
