@@ -190,7 +190,7 @@ def test_stereo_noise_grows_with_depth_and_leaves_holes():
         dataclasses.replace(seen, eye=seen.eye * factor, depth=seen.depth * factor)
         for factor in (1.0, 6.0)
     )
-    config = StereoNoise(holes=0.0, edge_holes=0.0, smeared=0.0)
+    config = StereoNoise(holes=0.0, edge_holes=0.0, smeared=0.0, sigma=0.001, growth=0.002)
     moved = [
         np.linalg.norm(
             add_stereo_noise(cloud, s, np.random.default_rng(1), config).points - cloud.points,
@@ -199,7 +199,7 @@ def test_stereo_noise_grows_with_depth_and_leaves_holes():
         for s in (near, far)
     ]
     assert moved[1] > 8 * moved[0]
-    holed = add_stereo_noise(cloud, seen, np.random.default_rng(1), StereoNoise(edge_holes=0))
+    holed = add_stereo_noise(cloud, seen, np.random.default_rng(1), StereoNoise(holes=0.1, edge_holes=0))
     assert len(holed.points) == pytest.approx(len(cloud.points) * 0.9, rel=0.03)
 
 
