@@ -33,8 +33,8 @@ class PointClassifier(nn.Module):
         self.embed_object = _mlp(objects + waves, width, width)
         self.gather = _mlp(points + waves, width, width)
         self.kind = nn.Embedding(3, width)
-        self.token_blocks = nn.ModuleList(_Block(config) for _ in range(config.token_layers))
-        self.point_blocks = nn.ModuleList(_Block(config) for _ in range(config.point_layers))
+        self.token_blocks = nn.ModuleList(NearBlock(config) for _ in range(config.token_layers))
+        self.point_blocks = nn.ModuleList(NearBlock(config) for _ in range(config.point_layers))
         self.norm_tokens = nn.LayerNorm(width)
         self.norm_points = nn.LayerNorm(width)
         self.head = nn.Linear(width, 1)
@@ -93,7 +93,7 @@ class PointClassifier(nn.Module):
         return torch.cat([features[..., :used], angle.sin(), angle.cos()], dim=-1)
 
 
-class _Block(nn.Module):
+class NearBlock(nn.Module):
     """Attention that favours near tokens, then an MLP, each on normalised input."""
 
     def __init__(self, config: NetworkConfig) -> None:
