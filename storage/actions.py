@@ -18,7 +18,12 @@ from storage.digest import digest_bytes, digest_value, hexadecimal, is_digest
 if TYPE_CHECKING:
     from storage.medium import Medium
 
-FORMAT = 1
+FORMAT = 2
+_UNSEALED = 1
+"""The format of records that do not hold their own digest; they are read as they are."""
+
+_SEAL, _END = b', "~digest": "', b'"}'
+_DIGEST_LENGTH = 67
 
 
 @dataclass(frozen=True)
@@ -55,26 +60,42 @@ class ActionRecord:
     why: dict[str, str] = field(default_factory=dict)
 
     def to_bytes(self) -> bytes:
-        """Return the record as JSON."""
+        """Return the record as JSON, sealed by its own digest."""
         document = {"format": FORMAT, **dataclasses.asdict(self)}
-        return json.dumps(document, sort_keys=True, ensure_ascii=False, indent=1).encode()
+        body = json.dumps(document, sort_keys=True, ensure_ascii=False).encode()
+        return b"".join((body[:-1], _SEAL, digest_bytes(body).encode(), _END))
 
     @classmethod
     def from_bytes(cls, data: bytes) -> ActionRecord:
-        """Read a record; ValueError if it is none of this format."""
-        document = json.loads(data)
-        if not isinstance(document, dict) or document.pop("format", None) != FORMAT:
-            raise ValueError("no action record of a known format")
-        outputs = {name: Output(**output) for name, output in document.pop("outputs").items()}
+        """Read a record; ValueError if it is none of a known format, or was damaged."""
+        document = _document(data)
         try:
+            outputs = {name: Output(**output) for name, output in document.pop("outputs").items()}
             return cls(outputs=outputs, **document)
-        except TypeError as error:
+        except (AttributeError, KeyError, TypeError) as error:
             raise ValueError(f"no action record: {error}") from error
 
     def same_outputs(self, other: ActionRecord) -> bool:
         """Tell whether both records hold the same contents."""
         contents = {name: output.content for name, output in self.outputs.items()}
         return contents == {name: output.content for name, output in other.outputs.items()}
+
+
+def _document(data: bytes) -> dict[str, Any]:
+    """Return what a record's bytes say; ValueError if they are not those that were written."""
+    end = len(data) - len(_END)
+    start = end - _DIGEST_LENGTH
+    sealed = data[start - len(_SEAL) : start] == _SEAL and data[end:] == _END
+    if sealed:
+        body = data[: start - len(_SEAL)] + b"}"
+        if digest_bytes(body) != data[start:end].decode("ascii", "replace"):
+            raise ValueError("the action record has changed since it was written")
+        data = body
+    document = json.loads(data)
+    form = document.pop("format", None) if isinstance(document, dict) else None
+    if form != (FORMAT if sealed else _UNSEALED):
+        raise ValueError("no action record of a known format")
+    return dict(document)
 
 
 def action_name(key: str) -> str:
@@ -99,7 +120,7 @@ def read_action(medium: Medium, key: str) -> ActionRecord | None:
     data = medium.read(action_name(key))
     try:
         record = None if data is None else ActionRecord.from_bytes(data)
-    except (ValueError, KeyError):
+    except ValueError:
         return None
     return record if record is not None and record.key == key else None
 
@@ -146,7 +167,7 @@ def _records(medium: Medium, prefix: str) -> Iterator[ActionRecord]:
         try:
             if data is not None:
                 yield ActionRecord.from_bytes(data)
-        except (ValueError, KeyError):
+        except ValueError:
             continue
 
 
@@ -205,7 +226,7 @@ def keep_for_explanations(medium: Medium, record: ActionRecord) -> None:
     name = latest_name(record.scene, record.step, record.label)
     pointer = _pointer(medium, name)
     if pointer.get("key") == record.key and "record" not in pointer:
-        document = {**pointer, "record": json.loads(record.to_bytes())}
+        document = {**pointer, "record": record.to_bytes().decode()}
         medium.replace(name, json.dumps(document, sort_keys=True).encode())
 
 
@@ -215,8 +236,8 @@ def _pointed_record(medium: Medium, pointer: dict[str, Any]) -> ActionRecord | N
     try:
         record = read_action(medium, pointer["key"])
         if record is None and "record" in pointer:
-            return ActionRecord.from_bytes(json.dumps(pointer["record"]).encode())
-    except (ValueError, KeyError, TypeError):
+            return ActionRecord.from_bytes(pointer["record"].encode())
+    except (ValueError, AttributeError):
         return None
     return record
 

@@ -145,15 +145,26 @@ class FolderMedium:
             _sync_folders(staged.folder)
         target = self.folder(digest)
         _os.ensure_folder(target.parent, durable=self.durable)
-        try:
-            _os.active.rename(staged.folder, target)
-        except OSError as error:
-            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
-                raise
+        if not self._take_name(staged.folder, target):
             return False
         if self.durable:
             _os.active.fsync(target.parent)
         return True
+
+    def _take_name(self, staged: Path, target: Path) -> bool:
+        """Rename what is staged; False if an object stands there. Empty folders are none."""
+        for _try in range(2):
+            try:
+                _os.active.rename(staged, target)
+            except OSError as error:
+                if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+                    raise
+            else:
+                return True
+            if file_sizes(target):
+                return False
+            self._move_away([target], "trash", uuid.uuid4().hex)
+        return False
 
     def refresh(self, digest: str, manifest: bytes) -> None:
         """Make an object young again if it is older than an hour and not another user's."""

@@ -71,7 +71,7 @@ class Ledger:
     def record(self, entry: Entry) -> ActionRecord | None:
         """Return the whole record of an entry, None if it is gone."""
         data = self._medium.read(entry.name)
-        with suppress(ValueError, KeyError):
+        with suppress(ValueError):
             return None if data is None else ActionRecord.from_bytes(data)
         return None
 

@@ -102,7 +102,6 @@ def test_a_record_that_cannot_be_read_counts_for_nothing(
     assert trial.made_again == (which == 0)
 
 
-@pytest.mark.xfail(strict=True, reason="an action record does not hold its own digest")
 def test_any_flipped_bit_of_an_action_record_is_found_and_mended(
     bench: Callable[[str], Bench],
 ) -> None:
@@ -118,7 +117,6 @@ def test_any_flipped_bit_of_an_action_record_is_found_and_mended(
     assert wrong == []
 
 
-@pytest.mark.xfail(strict=True, reason="Output(**...) raises TypeError out of from_bytes")
 def test_a_record_with_another_field_does_not_stop_the_mending_of_others(tmp_path: Path) -> None:
     one, two = Bench(tmp_path / "store", "Placement"), Bench(tmp_path / "store", "Rivals")
     there = behind(one.store)
@@ -138,7 +136,6 @@ def test_a_flipped_bit_in_the_pointer_to_the_newest_stops_no_step(tmp_path: Path
     assert trial.made_again
 
 
-@pytest.mark.xfail(strict=True, reason="empty folders stand in the way of the rename")
 def test_an_object_of_which_only_empty_folders_are_left_is_made_again(
     bench: Callable[[str], Bench],
 ) -> None:

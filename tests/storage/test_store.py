@@ -216,5 +216,5 @@ def test_action_records_are_plain_json(store: Store) -> None:
     store.record(record_of(store))
     [name] = behind(store).names("actions/")
     document = json.loads(behind(store).get(name))
-    assert document["format"] == 1
+    assert document["format"] == 2
     assert document["outputs"]["value"]["kind"] == "Scene"

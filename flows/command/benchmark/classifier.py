@@ -23,7 +23,7 @@ def configure(name: str, parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="train a network of the preset without each augmentation in turn",
     )
-    group.add_argument(
+    parser.add_argument(
         "--speed", action="store_true", help="time a crop of 200,000 points and count operations"
     )
 

@@ -199,7 +199,9 @@ def test_stereo_noise_grows_with_depth_and_leaves_holes():
         for s in (near, far)
     ]
     assert moved[1] > 8 * moved[0]
-    holed = add_stereo_noise(cloud, seen, np.random.default_rng(1), StereoNoise(holes=0.1, edge_holes=0))
+    holed = add_stereo_noise(
+        cloud, seen, np.random.default_rng(1), StereoNoise(holes=0.1, edge_holes=0)
+    )
     assert len(holed.points) == pytest.approx(len(cloud.points) * 0.9, rel=0.03)
 
 
