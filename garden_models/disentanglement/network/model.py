@@ -111,7 +111,7 @@ class NearBlock(nn.Module):
         self.sharpness = nn.Parameter(first.clamp(min=0.05).log())
 
     def forward(self, asking: Tensor, here: Tensor, asked: Tensor, there: Tensor) -> Tensor:
-        """Return what the tokens ``asking``, at ``here``, take from those ``asked``, at ``there``."""
+        """Return what the tokens ``asking`` (at ``here``) take from ``asked`` (at ``there``)."""
         query = self._split(self.query(self.norm_asking(asking)))
         key, value = self.key_value(self.norm_asked(asked)).chunk(2, dim=-1)
         seen = near_attention(
