@@ -100,7 +100,7 @@ def converge(path: Path) -> Iterator[str]:
     if set(store.medium.objects()) != needed:
         yield "objects are left that no action needs"
     for place in ("tmp", "trash"):
-        if any((path / place).iterdir()):
+        if (path / place).exists() and any((path / place).iterdir()):
             yield f"something is left in {place}"
     if list((path / "leases").glob("*.json")):
         yield "leases are left"
