@@ -76,15 +76,15 @@ SMOKE = TrainingPreset(
 )
 CPU = TrainingPreset(
     name="cpu",
-    rooms=280,
-    validation_rooms=15,
-    test_rooms=30,
+    rooms=200,
+    validation_rooms=10,
+    test_rooms=20,
     rooms_a_shard=20,
-    checkpoint_every=100,
+    checkpoint_every=200,
     pairs=_MIXED,
-    network=NetworkConfig(width=64, token_layers=2, point_layers=2, scene_tokens=160),
+    network=NetworkConfig(width=64, token_layers=3, point_layers=2, scene_tokens=160),
     optimisation=Optimisation(
-        steps=1500, batch=16, learning_rate=2e-3, token_loss=0.5, symmetries=True, points=768
+        steps=2400, batch=16, learning_rate=2e-3, token_loss=0.5, symmetries=True, points=640
     ),
 )
 PAPER = TrainingPreset(
