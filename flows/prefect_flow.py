@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import threading
 import time
@@ -16,6 +17,7 @@ os.environ.setdefault("PREFECT_LOGGING_LEVEL", "CRITICAL")
 import httpx
 from prefect import Flow, flow, tags
 from prefect.artifacts import create_progress_artifact, update_progress_artifact
+from prefect.context import TagsContext
 from prefect.task_runners import ThreadPoolTaskRunner
 
 from tasks.step import StepEvent, step_name
@@ -43,13 +45,25 @@ def of_collection(collection: str) -> AbstractContextManager[Any]:
 
 
 def _flow(name: str, run_name: str) -> Callable[[Callable[..., Any]], Flow[..., Any]]:
-    return flow(
+    as_flow = flow(
         name=name,
         flow_run_name=run_name.replace("{", "(").replace("}", ")"),
         task_runner=ThreadPoolTaskRunner(max_workers=MAX_TASKS),
         validate_parameters=False,
         persist_result=False,
     )
+    return lambda function: as_flow(_with_untagged_tasks(function))
+
+
+def _with_untagged_tasks(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Keep a flow run's tags from its tasks, which would ask the server for a slot for each."""
+
+    @functools.wraps(function)
+    def body(*args: Any, **kwargs: Any) -> Any:
+        with TagsContext(current_tags=set()):
+            return function(*args, **kwargs)
+
+    return body
 
 
 class PrefectProgress:

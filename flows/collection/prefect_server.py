@@ -14,6 +14,7 @@ import subprocess
 import sys
 import time
 
+from flows.server_profile import SERVER_PROFILES
 from tasks.step.child import die_with
 
 START_S = 180.0
@@ -82,7 +83,8 @@ def main() -> None:
     """Serve on the socket until the batch ends."""
     descriptor, parent = int(sys.argv[1]), int(sys.argv[2])
     die_with(parent)
-    os.environ |= {"PREFECT_UI_ENABLED": "0", "PREFECT_SERVER_ANALYTICS_ENABLED": "false"}
+    settings = {"PREFECT_SERVER_ANALYTICS_ENABLED": "false"} | SERVER_PROFILES["lean"]
+    os.environ |= {name: value for name, value in settings.items() if name not in os.environ}
     import uvicorn
     from prefect.server.api.server import create_app
 

@@ -13,12 +13,13 @@ from typing import Literal
 
 from flows.benchmark.orchestration.growth import Growth, growth_by_part
 from flows.benchmark.orchestration.sampling import Sample, sampled
-from flows.benchmark.orchestration.server import SERVER_PROFILES, Server, prefect_server
+from flows.benchmark.orchestration.server import Server, prefect_server
 from flows.benchmark.orchestration.simulated_job import simulated_orders
 from flows.benchmark.orchestration.simulated_scene import steps_of
 from flows.collection.definition import Collection
 from flows.collection.run import CollectionResult, Options, RowEvent, run_jobs
 from flows.collection.state import STATE
+from flows.server_profile import SERVER_PROFILES
 from storage import Store
 from tasks.step import Budget
 

@@ -18,25 +18,6 @@ from pathlib import Path
 
 from flows.benchmark.orchestration.process_usage import Usage, group_usage
 
-_PATIENT = {
-    "PREFECT_SERVER_DATABASE_TIMEOUT": "60",
-    "PREFECT_SERVER_DATABASE_CONNECTION_TIMEOUT": "60",
-}
-SERVER_PROFILES: dict[str, dict[str, str]] = {
-    "full": _PATIENT,
-    "lean": _PATIENT
-    | {
-        "PREFECT_SERVER_SERVICES_EVENT_PERSISTER_ENABLED": "false",
-        "PREFECT_SERVER_SERVICES_TRIGGERS_ENABLED": "false",
-        "PREFECT_SERVER_UI_ENABLED": "false",
-    },
-}
-"""Settings of a server. Both wait a minute for SQLite, which one writer locks: after the usual
-ten seconds a busy server answers 503 and the scene fails. ``lean`` keeps no events and runs
-no automations (so that runs of killed processes are not marked); flow runs and task runs are
-recorded as ever.
-"""
-
 STARTS_WITHIN_S = 120.0
 STOPS_WITHIN_S = 15.0
 _QUIET_SHARE = 0.1  # of one core
