@@ -8,6 +8,7 @@ key; it is derived from the records and only used for explanations.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -177,6 +178,7 @@ def latest_name(scene: str, step: str, label: str) -> str:
     return f"{_latest_shelf(scene)}{name}.json"
 
 
+@functools.lru_cache(maxsize=64)
 def _latest_shelf(scene: str) -> str:
     return f"latest/{hexadecimal(digest_value(scene, domain='garden.scene/1'))[:24]}/"
 

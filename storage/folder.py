@@ -51,7 +51,7 @@ class FolderMedium:
     def read(self, name: str) -> bytes | None:
         """Return a document, None if there is none."""
         try:
-            return (self.path / name).read_bytes()
+            return _read(f"{self.address}/{name}")
         except FileNotFoundError:
             return None
 
@@ -123,6 +123,11 @@ class FolderMedium:
 
     # -- objects --------------------------------------------------------------------------
 
+    def _place(self, digest: str) -> str:
+        """Return the same as ``folder`` does; every hit pays for this."""
+        name = hexadecimal(digest)
+        return f"{self.address}/objects/b3/{name[:2]}/{name[2:]}"
+
     def folder(self, digest: str) -> Path:
         """Return where the object of this digest stands."""
         name = hexadecimal(digest)
@@ -184,19 +189,11 @@ class FolderMedium:
 
     def members(self, digest: str) -> dict[str, int]:
         """Return the files of an object and their bytes."""
-        return file_sizes(self.folder(digest))
+        return file_sizes(self._place(digest))
 
     def read_member(self, digest: str, path: str, start: int = 0, stop: int | None = None) -> bytes:
         """Return the bytes ``start:stop`` of a file of an object."""
-        place = self.folder(digest) / path
-        if start == 0 and stop is None:
-            return place.read_bytes()
-        descriptor = os.open(place, os.O_RDONLY | os.O_CLOEXEC)
-        try:
-            end = os.fstat(descriptor).st_size if stop is None else stop
-            return os.pread(descriptor, end - start, start)
-        finally:
-            os.close(descriptor)
+        return _read(f"{self._place(digest)}/{path}", start, stop)
 
     def member_digest(self, digest: str, path: str) -> str:
         """Return the digest of a file of an object."""
@@ -273,7 +270,21 @@ class FolderMedium:
             yield folder
 
 
-def files_below(folder: Path, prefix: str = "") -> dict[str, os.DirEntry[str]]:
+def _read(place: str, start: int = 0, stop: int | None = None) -> bytes:
+    """Return the bytes ``start:stop`` of a file with as few calls as it takes."""
+    descriptor = os.open(place, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        end = os.fstat(descriptor).st_size if stop is None else stop
+        pieces = []
+        while start < end and (piece := os.pread(descriptor, end - start, start)):
+            pieces.append(piece)
+            start += len(piece)
+        return pieces[0] if len(pieces) == 1 else b"".join(pieces)
+    finally:
+        os.close(descriptor)
+
+
+def files_below(folder: Path | str, prefix: str = "") -> dict[str, os.DirEntry[str]]:
     """Return every file below a folder by its relative name."""
     found: dict[str, os.DirEntry[str]] = {}
     try:
@@ -282,13 +293,13 @@ def files_below(folder: Path, prefix: str = "") -> dict[str, os.DirEntry[str]]:
         return found
     for entry in entries:
         if entry.is_dir(follow_symlinks=False):
-            found |= files_below(Path(entry.path), f"{prefix}{entry.name}/")
+            found |= files_below(entry.path, f"{prefix}{entry.name}/")
         else:
             found[prefix + entry.name] = entry
     return found
 
 
-def file_sizes(folder: Path) -> dict[str, int]:
+def file_sizes(folder: Path | str) -> dict[str, int]:
     """Return the bytes of every file below a folder by its relative name."""
     sizes: dict[str, int] = {}
     for name, entry in files_below(folder).items():

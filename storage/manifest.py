@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from pathlib import PurePosixPath
 
 from storage.digest import digest_bytes
 from storage.errors import StoreFormatError
@@ -75,7 +74,6 @@ class Manifest:
 
 
 def _safe(path: str) -> str:
-    pure = PurePosixPath(path)
-    if pure.is_absolute() or ".." in pure.parts or str(pure) != path or path in ("", "."):
+    if any(part in ("", ".", "..") for part in path.split("/")):
         raise StoreFormatError(f"manifest member {path!r} would leave its object")
     return path

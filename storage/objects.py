@@ -90,17 +90,19 @@ def verify(medium: Medium, digest: str, level: Level) -> Manifest:
     manifest = read_manifest(medium, digest)
     present = medium.members(digest)
     present.pop(MANIFEST, None)
-    if missing := sorted(manifest.members.keys() - present.keys()):
-        raise CorruptArtifact(digest, f"member {missing[0]} is missing")
-    if extra := sorted(present.keys() - manifest.members.keys()):
-        raise CorruptArtifact(digest, f"{extra[0]} is no member")
-    for path, member in manifest.members.items():
-        if present[path] != member.size:
-            raise CorruptArtifact(
-                digest, f"member {path} has {present[path]} bytes instead of {member.size}"
-            )
+    if present != {path: member.size for path, member in manifest.members.items()}:
+        raise CorruptArtifact(digest, _difference(manifest, present))
     if level == "full":
         for path, member in manifest.members.items():
             if medium.member_digest(digest, path) != member.digest:
                 raise CorruptArtifact(digest, f"member {path} has changed")
     return manifest
+
+
+def _difference(manifest: Manifest, present: dict[str, int]) -> str:
+    if missing := sorted(manifest.members.keys() - present.keys()):
+        return f"member {missing[0]} is missing"
+    if extra := sorted(present.keys() - manifest.members.keys()):
+        return f"{extra[0]} is no member"
+    path, member = next((p, m) for p, m in manifest.members.items() if present[p] != m.size)
+    return f"member {path} has {present[path]} bytes instead of {member.size}"
