@@ -63,7 +63,7 @@ def read_catalogue(medium: Medium, *, keep: bool = True) -> Any:
     """
     import pyarrow.compute as pc
 
-    table = _read(medium, list(COLUMNS), keep)
+    table = _read(medium, dict(medium.times("actions/")), list(COLUMNS), keep)
     return table.take(pc.sort_indices(table, [("key", "ascending"), ("output", "ascending")]))
 
 
@@ -77,16 +77,18 @@ def read_columns(medium: Medium, *columns: str) -> list[tuple[Any, ...]]:
     if len(times) < _WORTH_A_PART and not any(medium.names(_PLACE)):
         rows = [tuple(row[name] for name in wanted) for row in _rows(medium, times)]
     else:
-        table = _read(medium, wanted, keep=True)
+        table = _read(medium, times, wanted, keep=True)
         rows = list(zip(*(table[name].to_pylist() for name in wanted), strict=True))
     return [row[:-1] for row in sorted(rows, key=lambda row: row[-1])]
 
 
-def _read(medium: Medium, columns: list[str], keep: bool) -> Any:
-    """Return columns of the rows in parts that still hold, and of the actions not in them."""
+def _read(medium: Medium, written: dict[str, float], columns: list[str], keep: bool) -> Any:
+    """Return columns of the rows in parts that still hold, and of the actions not in them.
+
+    ``written`` says which actions there are, and since when.
+    """
     import pyarrow as pa
 
-    written = dict(medium.times("actions/"))
     needed = list(dict.fromkeys([*columns, *_IDENTITY]))
     parts, damaged = _read_parts(medium, needed)
     known = pa.concat_tables([_table([]).select(needed), *_distinct(parts, written)])

@@ -116,10 +116,9 @@ class FolderMedium:
 
     def times(self, prefix: str) -> Iterator[tuple[str, float]]:
         """Give the name of every document below a folder, and when it was last written."""
-        found = files_below(self.path / prefix)
-        for name, entry in sorted(found.items()):
+        for name, entry in files_below(self.path / prefix, prefix).items():
             with suppress(FileNotFoundError):
-                yield f"{prefix}{name}", entry.stat(follow_symlinks=False).st_mtime
+                yield name, entry.stat(follow_symlinks=False).st_mtime
 
     # -- objects --------------------------------------------------------------------------
 
@@ -285,18 +284,22 @@ def _read(place: str, start: int = 0, stop: int | None = None) -> bytes:
 
 
 def files_below(folder: Path | str, prefix: str = "") -> dict[str, os.DirEntry[str]]:
-    """Return every file below a folder by its relative name."""
+    """Return every file below a folder by its relative name, in a stable order."""
     found: dict[str, os.DirEntry[str]] = {}
+    _add_files(os.fspath(folder), prefix, found)
+    return found
+
+
+def _add_files(folder: str, prefix: str, found: dict[str, os.DirEntry[str]]) -> None:
     try:
-        entries = list(os.scandir(folder))
+        entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     except (FileNotFoundError, NotADirectoryError):
-        return found
+        return
     for entry in entries:
         if entry.is_dir(follow_symlinks=False):
-            found |= files_below(entry.path, f"{prefix}{entry.name}/")
+            _add_files(entry.path, f"{prefix}{entry.name}/", found)
         else:
             found[prefix + entry.name] = entry
-    return found
 
 
 def file_sizes(folder: Path | str) -> dict[str, int]:
