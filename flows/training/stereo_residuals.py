@@ -26,17 +26,22 @@ def fitted_stereo_noise(folder: Path, store: Store) -> StereoNoise:
     return fit_stereo_noise(depth_pairs(folder, store))
 
 
-def depth_pairs(folder: Path, store: Store) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return estimated and true z-depth (metres) of every view that has a truth."""
-    truth = load_corner(folder)
-    capture = find_capture(folder, truth.transforms)
+def reconstructed_with_cameras(folder: Path, store: Store) -> Reconstruction:
+    """Return our reconstruction of a capture like ``corner`` from its true cameras."""
+    capture = find_capture(folder, load_corner(folder).transforms)
     with run_context(RunContext(store=store, scene=capture.name)):
         photos = ingest(capture.source, Preset().ingest)
         cameras = register(photos, Preset().register)
         dense = reconstruct(photos, cameras, Preset().reconstruct)
         found: Reconstruction = load(dense, Reconstruction)
+    return found
+
+
+def depth_pairs(folder: Path, store: Store) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return estimated and true z-depth (metres) of every view that has a truth."""
+    truth = load_corner(folder)
     pairs = []
-    for view in found.views:
+    for view in reconstructed_with_cameras(folder, store).views:
         if view.photo in truth.depths:
             known = truth.depths[view.photo].depth
             pairs.append((view.depth, truth_at_view(known, view.K, view.size, view.distortion)))

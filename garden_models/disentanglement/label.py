@@ -48,7 +48,7 @@ def label_points(
     points_gv = cloud_in_gv(reconstruction.points_world, gravity_view)
     vertices = transform_points(placement.best.gv_from_object, np.asarray(mesh.vertices, float))
     placed = PlacedMesh(vertices, mesh.faces)
-    near = _relaxed_box(points_gv, placed, config.relaxed)
+    near = relaxed_box(points_gv, placed, config.relaxed)
     crop = Crop(
         points_gv.subset(near),
         placed,
@@ -102,7 +102,7 @@ def view_evidence(
     )
 
 
-def _relaxed_box(points_gv: PointCloud, mesh: PlacedMesh, relaxed: float) -> Bool[np.ndarray, " n"]:
+def relaxed_box(points_gv: PointCloud, mesh: PlacedMesh, relaxed: float) -> Bool[np.ndarray, " n"]:
     """Tell which points are in the mesh's gravity-aligned box, grown but not downwards."""
     margin: Float[np.ndarray, "3"] = np.full(3, relaxed * mesh.size)
     low = mesh.vertices_gv.min(axis=0) - margin

@@ -8,12 +8,20 @@ from pathlib import Path
 
 from flows.command import EXIT_FAILED, EXIT_OK, print_json, say
 from flows.command.store_option import open_store
+from storage import Store
 
 PRESETS = ("smoke", "cpu", "paper")
 
 
 def configure(name: str, parser: argparse.ArgumentParser) -> None:
     """Add the options."""
+    parser.add_argument(
+        "captures",
+        nargs="*",
+        type=Path,
+        metavar="FOLDER",
+        help="score on captures with truth like the sample, instead of held-out pairs",
+    )
     parser.add_argument("--weights", metavar="FILE", type=Path, help="a checkpoint (the shipped)")
     parser.add_argument(
         "--preset", choices=PRESETS, default="cpu", help="whose held-out pairs (cpu)"
@@ -42,6 +50,8 @@ def run(options: argparse.Namespace) -> int:
     path = options.weights or checkpoint_file()
     if options.speed:
         return _speed(options)
+    if options.captures:
+        return _on_sample(options, store)
     try:
         with TerminalView("garden benchmark classifier") as view:
             if options.ablation:
@@ -65,6 +75,21 @@ def run(options: argparse.Namespace) -> int:
         if scores:
             print(f"\nF1 by {title}")
             print(table(range_rows(scores, name)))
+    return EXIT_OK
+
+
+def _on_sample(options: argparse.Namespace, store: Store) -> int:
+    """Print the scores on captures with truth like ``tests/scenes/corner``."""
+    from flows.benchmark.captures import table
+    from flows.benchmark.classifier_on_sample import sample_rows
+
+    rows = []
+    for folder in options.captures:
+        rows += sample_rows(folder, store, str(options.weights or ""))
+    if options.json:
+        print_json({"benchmark": "classifier", "rows": rows})
+    else:
+        print(table(rows))
     return EXIT_OK
 
 

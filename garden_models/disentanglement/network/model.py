@@ -111,7 +111,7 @@ class NearBlock(nn.Module):
         self.sharpness = nn.Parameter(first.clamp(min=0.05).log())
 
     def forward(self, asking: Tensor, here: Tensor, asked: Tensor, there: Tensor) -> Tensor:
-        """Return what the tokens ``asking`` (at ``here``) take from ``asked`` (at ``there``)."""
+        """Return what asks, enriched by what is asked; ``here`` and ``there`` are places."""
         query = self._split(self.query(self.norm_asking(asking)))
         key, value = self.key_value(self.norm_asked(asked)).chunk(2, dim=-1)
         seen = near_attention(
