@@ -71,9 +71,9 @@ def operations(model: PointClassifier, points: int) -> int:
     points_blocks = [b for b in model.point_blocks if isinstance(b, network.NearBlock)]
     for block in points_blocks:
         by_point += sum(_linear(part) for part in (block.query, block.out, block.mlp))
-        by_point += 2 * tokens * (2 * config.width + 4 * config.heads)
+        by_point += 2 * tokens * (2 * config.width + 8 * config.heads)
     by_token = sum(_linear(block) for block in model.token_blocks)
-    by_token += len(model.token_blocks) * 2 * tokens * (2 * config.width + 4 * config.heads)
+    by_token += len(model.token_blocks) * 2 * tokens * (2 * config.width + 8 * config.heads)
     keys = sum(_linear(block.key_value) for block in points_blocks)
     return points * by_point + tokens * (by_token + keys)
 

@@ -143,8 +143,10 @@ def near_attention(
     squared = -factor * there.square().sum(dim=-1, keepdim=True)
     longer = torch.cat([query / query.shape[-1] ** 0.5, 2 * factor * here, ones], dim=-1)
     wider = torch.cat([key, there.expand(-1, len(sharpness), -1, -1), squared], dim=-1)
-    weight = (longer @ wider.transpose(-1, -2)).softmax(dim=-1)
-    return weight @ value
+    # The fused kernel wants all three equally wide; it makes no matrix of weights.
+    padded = F.pad(value, (0, longer.shape[-1] - value.shape[-1]))
+    seen = F.scaled_dot_product_attention(longer, wider, padded, scale=1.0)
+    return seen[..., : value.shape[-1]]
 
 
 def _mlp(inner: int, hidden: int, outer: int) -> nn.Sequential:
