@@ -10,8 +10,8 @@ from __future__ import annotations
 from garden_models.disentanglement.network.config import NetworkConfig
 from garden_models.disentanglement.training.config import Optimisation
 from garden_models.disentanglement.training.described import DescribedShard
-from garden_models.disentanglement.training.state import TrainingState
 from garden_models.progress import Progress, silent
+from garden_models.training.state import TrainingState
 from tasks.step import step
 
 

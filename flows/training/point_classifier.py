@@ -6,16 +6,17 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
+from flows.training.chain import checkpoints, each
 from garden_models.disentanglement.evaluation.method_scores import ClassifierWeights, MethodScores
 from garden_models.disentanglement.training.augmentations.config import NAMES, NONE, without
 from garden_models.disentanglement.training.config import TrainingPreset
 from garden_models.disentanglement.training.pairs_config import PairsConfig
 from garden_models.disentanglement.training.splits import Split
-from garden_models.disentanglement.training.state import TrainingState
+from garden_models.training.state import TrainingState
 from tasks.describe_training_pairs import describe_training_pairs
 from tasks.make_training_pairs import make_training_pairs
 from tasks.score_point_classifier import score_baselines, score_point_classifier
-from tasks.step import Ref, StepFailed, fan_out, load
+from tasks.step import Ref, load
 from tasks.train_point_classifier import start_point_classifier, train_point_classifier
 
 SETTINGS = ("clean", "augmented")
@@ -47,22 +48,16 @@ class EvaluationPairs:
 def train(preset: TrainingPreset) -> TrainedClassifier:
     """Train by a preset, or find the training in the store. Raises StepFailed."""
     pairs = shards("train", preset.rooms, preset, preset.pairs)
-    described = _each(lambda shard: describe_training_pairs(shard, preset.network), pairs)
-    states = [start_point_classifier(preset.network, preset.optimisation)]
-    total, every = preset.optimisation.steps, preset.checkpoint_every
-    for done in range(0, total, every):
-        steps = min(every, total - done)
-        states.append(
-            train_point_classifier(
-                states[-1],
-                described,
-                preset.network,
-                preset.optimisation,
-                steps,
-                label=f"to step {done + steps}",
-            )
-        )
-    return TrainedClassifier(preset, pairs, described, tuple(states))
+    described = each(lambda shard: describe_training_pairs(shard, preset.network), pairs)
+    states = checkpoints(
+        start_point_classifier(preset.network, preset.optimisation),
+        lambda state, steps, label: train_point_classifier(
+            state, described, preset.network, preset.optimisation, steps, label=label
+        ),
+        preset.optimisation.steps,
+        preset.checkpoint_every,
+    )
+    return TrainedClassifier(preset, pairs, described, states)
 
 
 def shards(
@@ -78,7 +73,7 @@ def shards(
             split, start, count, config, preset.packages, label=f"{split} {kind} {start}"
         )
 
-    return _each(make, starts)
+    return each(make, starts)
 
 
 def evaluation_pairs(preset: TrainingPreset) -> dict[str, EvaluationPairs]:
@@ -150,12 +145,3 @@ def ablations(preset: TrainingPreset) -> dict[str, TrainingPreset]:
         )
         for name, augmentations in changed.items()
     }
-
-
-def _each(function: Any, items: Any) -> tuple[Ref, ...]:
-    """Run a step for every item at the same time; raise the first failure."""
-    results = fan_out(function, items)
-    for result in results:
-        if isinstance(result, StepFailed):
-            raise result
-    return tuple(result for result in results if isinstance(result, Ref))

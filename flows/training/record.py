@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
-import platform
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from flows.training.hardware import hardware, hours
 from flows.training.pages import facts, loss_chart, page, pictures, section, table
 from flows.training.point_classifier import EvaluationPairs, TrainedClassifier
 from flows.training.run import write_whole
 from garden_models.disentanglement.evaluation.method_scores import MethodScores
 from garden_models.disentanglement.training.pair import PairShard
-from garden_models.disentanglement.training.state import TrainingState
+from garden_models.training.state import TrainingState
 from tasks.step import load
 
 CHECKPOINT, RECORD, PAGE = "point_classifier.safetensors", "record.json", "record.html"
@@ -53,8 +51,8 @@ def write_record(
                 for split in ("validation", "test")
             },
         },
-        "hardware": _hardware(),
-        "hours": _hours(trained),
+        "hardware": hardware(),
+        "hours": hours((*trained.pairs, *trained.described), trained.states),
         "steps": state.step,
         "last_loss": round(float(np.mean(state.losses[-50:])), 6) if state.step else None,
         "scores": {setting: dataclasses.asdict(rows) for setting, rows in scores.items()},
@@ -141,36 +139,3 @@ def _confusions(setting: str, asked: EvaluationPairs, checkpoint: bytes) -> str:
         colours = by_outcome(labels[k], shard.label[k])
         named[f"{shard.shapes[k]}, F1 {f1[k]:.3f}"] = cloud_picture(points, colours, box)
     return pictures(named, setting)
-
-
-def _hardware() -> dict[str, Any]:
-    import torch
-
-    gpu = torch.cuda.get_device_name(0) if torch.cuda.is_available() else ""
-    return {
-        "processor": _processor(),
-        "cores": os.cpu_count(),
-        "gpu": gpu,
-        "python": platform.python_version(),
-        "torch": version("torch"),
-    }
-
-
-def _processor() -> str:
-    info = Path("/proc/cpuinfo")
-    if info.is_file():
-        for line in info.read_text().splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
-
-
-def _hours(trained: TrainedClassifier) -> dict[str, float]:
-    """Return the hours of computing, also where results came from the store."""
-    data = sum(ref.seconds.compute for ref in (*trained.pairs, *trained.described)) / 3600
-    training = sum(ref.seconds.compute for ref in trained.states) / 3600
-    return {
-        "data": round(data, 3),
-        "training": round(training, 3),
-        "total": round(data + training, 3),
-    }

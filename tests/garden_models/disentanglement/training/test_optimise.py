@@ -20,7 +20,6 @@ from garden_models.disentanglement.training.described import DescribedShard, des
 from garden_models.disentanglement.training.optimise import (
     batch_at,
     pairs_at,
-    rate_at,
     start,
     train,
     trained_model,
@@ -28,6 +27,7 @@ from garden_models.disentanglement.training.optimise import (
 from garden_models.disentanglement.training.pairs import make_shard
 from garden_models.disentanglement.training.pairs_config import CLEAN
 from garden_models.scene import BadInput
+from garden_models.training.schedule import rate_at
 
 TINY = NetworkConfig(
     width=16, heads=2, token_layers=1, point_layers=1, scene_tokens=32, object_tokens=16
