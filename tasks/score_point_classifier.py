@@ -22,8 +22,10 @@ def score_baselines(
 
 
 @step(version=1, packages=("torch", "numpy", "scipy"), isolated=True)
-def score_point_classifier(weights: ClassifierWeights, test: tuple[PairShard, ...]) -> MethodScores:
+def score_point_classifier(
+    weights: ClassifierWeights, test: tuple[PairShard, ...], progress: Progress = silent
+) -> MethodScores:
     """Return the network's score."""
     from garden_models.disentanglement.evaluation.method_scores import score_network
 
-    return score_network(weights, test)
+    return score_network(weights, test, progress=progress)

@@ -122,13 +122,12 @@ def _confusions(setting: str, asked: EvaluationPairs, checkpoint: bytes) -> str:
     """Return pictures of the first test shard's pairs, from the worst to the best."""
     from garden_models.disentanglement.evaluation.network_labels import probabilities
     from garden_models.disentanglement.network.checkpoint import from_bytes
-    from garden_models.disentanglement.training.described import describe_shard
     from garden_models.disentanglement.training.picture import by_outcome, cloud_picture
     from garden_models.metrics.classification import confusion
 
     shard: PairShard = load(asked.test[0], PairShard)
     model = from_bytes(checkpoint).model
-    labels = probabilities(model, describe_shard(shard, model.config)) >= 0.5
+    labels = probabilities(model, shard) >= 0.5
     f1 = np.array([confusion(a, b).f1 for a, b in zip(labels, shard.label, strict=True)])
     order = np.argsort(f1)
     shown = order[np.linspace(0, len(order) - 1, min(SHOWN, len(order))).astype(int)]

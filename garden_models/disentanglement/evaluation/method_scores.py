@@ -59,20 +59,21 @@ def score_baselines(
 
 
 def score_network(
-    weights: ClassifierWeights, test: tuple[PairShard, ...], threshold: float = 0.5
+    weights: ClassifierWeights,
+    test: tuple[PairShard, ...],
+    threshold: float = 0.5,
+    progress: Progress = silent,
 ) -> MethodScores:
     """Return a network's score. Raises BadInput if the weights do not fit."""
     from garden_models.disentanglement.evaluation.network_labels import probabilities
     from garden_models.disentanglement.evaluation.score import score
     from garden_models.disentanglement.network.checkpoint import from_bytes
-    from garden_models.disentanglement.training.described import describe_shard
 
     checkpoint = from_bytes(weights.data)
-    config = checkpoint.model.config
     labels = [
         label
         for shard in test
-        for label in probabilities(checkpoint.model, describe_shard(shard, config)) >= threshold
+        for label in probabilities(checkpoint.model, shard, progress) >= threshold
     ]
     asked = pairs_of(test)
     note = f"checkpoint {checkpoint.digest[:12]}"

@@ -3,31 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
-import torch
 from jaxtyping import Float
 
 from garden_models.disentanglement.network.model import PointClassifier
-from garden_models.disentanglement.training.described import DescribedShard
-from garden_models.disentanglement.training.pair import CONTEXT_POINTS
-
-BATCH = 16
+from garden_models.disentanglement.network.predict import answer
+from garden_models.disentanglement.training.pair import CONTEXT_POINTS, PairShard
+from garden_models.progress import Progress, silent
 
 
 def probabilities(
-    model: PointClassifier, data: DescribedShard, points: int | None = None
+    model: PointClassifier, shard: PairShard, progress: Progress = silent
 ) -> Float[np.ndarray, "p n"]:
     """Return each point's probability of being its pair's object's."""
     found = []
-    model.eval()
-    with torch.inference_mode():
-        for start in range(0, len(data), BATCH):
-            rows = slice(start, start + BATCH)
-            features = torch.from_numpy(data.features[rows].astype(np.float32))
-            tokens, places = model.tokens(
-                features[:, :CONTEXT_POINTS],
-                torch.from_numpy(data.token[rows].astype(np.int64)),
-                torch.from_numpy(data.assigned[rows].astype(np.int64)),
-                torch.from_numpy(data.condition[rows].astype(np.float32)),
-            )
-            found.append(model(features[:, :points], tokens, places).sigmoid().numpy())
-    return np.concatenate(found)
+    for k in range(len(shard)):
+        progress(k / len(shard), f"pair {k} of {len(shard)}")
+        pair = shard.pair(k)
+        points = pair.cloud.points.astype(np.float64)
+        found.append(answer(model, points[:CONTEXT_POINTS], points, pair.condition))
+    return np.stack(found)

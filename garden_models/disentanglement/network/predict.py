@@ -18,11 +18,14 @@ from garden_models.disentanglement.network.describe import (
     describe_points,
 )
 from garden_models.disentanglement.network.model import PointClassifier
+from garden_models.disentanglement.network.realign import realigned
 from garden_models.disentanglement.training.pair import CONTEXT_POINTS, Condition
 from garden_models.progress import Progress, silent
 from garden_models.scene import BadInput
 
 CHUNK = 8192
+PASSES = 3
+"""How often the context is read at most."""
 THINNED = 4 * CONTEXT_POINTS
 """Points that are left, evenly spread, before the context is drawn from them."""
 
@@ -41,18 +44,51 @@ def predict(
     _check(points, condition)
     if not len(points):
         return np.zeros(0)
-    context = describe_context(points[choose_context(points)], condition, model.config)
+    return answer(model, points[choose_context(points)], points, condition, chunk, progress)
+
+
+def answer(
+    model: PointClassifier,
+    seen: Float[np.ndarray, "c 3"],
+    points: Float[np.ndarray, "n 3"],
+    condition: Condition,
+    chunk: int = CHUNK,
+    progress: Progress = silent,
+) -> Float[np.ndarray, " n"]:
+    """Return probabilities of ``points`` from the context points ``seen``.
+
+    The context is labelled first; where its object points show that the mesh lies elsewhere,
+    it is laid onto them and the context is read again.
+    """
     device = next(model.parameters()).device
     probability = np.empty(len(points))
     model.eval()
     with torch.inference_mode():
-        tokens, places = model.tokens(*context_tensors(context, device))
+        context, tokens, places = _settled(model, seen, condition, device)
         for start in range(0, len(points), chunk):
             progress(start / len(points), f"{len(points)} points")
             asked = describe_points(points[start : start + chunk], context)
             logits = model(torch.from_numpy(asked)[None].to(device), tokens, places)
             probability[start : start + chunk] = logits[0].sigmoid().cpu().numpy()
     return probability
+
+
+def _settled(
+    model: PointClassifier, seen: np.ndarray, condition: Condition, device: torch.device
+) -> tuple[Context, Tensor, Tensor]:
+    """Return the context with the condition where the object's points are, and its tokens."""
+    for left in reversed(range(PASSES)):
+        context = describe_context(seen, condition, model.config)
+        tokens, places = model.tokens(*context_tensors(context, device))
+        if not left or not model.config.geometric:
+            break
+        features = torch.from_numpy(context.features)[None].to(device)
+        taken = model(features, tokens, places)[0].cpu().numpy() >= 0
+        better = realigned(seen[taken], condition)
+        if better is None:
+            break
+        condition = better
+    return context, tokens, places
 
 
 def context_tensors(context: Context, device: torch.device) -> tuple[Tensor, ...]:
