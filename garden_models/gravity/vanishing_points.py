@@ -82,21 +82,38 @@ def long_segments(rgb: UInt8[np.ndarray, "h w 3"]) -> Float[np.ndarray, "n 4"]:
     return segments[long][order]
 
 
+def lift(
+    segments: Float[np.ndarray, "n 4"],
+    K: Float[np.ndarray, "3 3"],
+    rotation: Float[np.ndarray, "3 3"],
+    size: tuple[int, int],
+) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return the plane normals in the world of a picture's segments, their sigmas and weights.
+
+    ``rotation`` is camera from world, ``size`` the picture's width and height in pixels.
+    """
+    first, second = (pixel_rays(segments[:, s], K) for s in (slice(0, 2), slice(2, 4)))
+    normal = np.cross(first, second)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    length = np.hypot(segments[:, 2] - segments[:, 0], segments[:, 3] - segments[:, 1])
+    sigma = np.hypot(np.sqrt(2) * ENDPOINT_PX / length, STRUCTURE)
+    weight = np.minimum(length / np.hypot(*size), 0.2) / 0.2
+    return normal @ rotation, sigma, weight
+
+
 def lift_segments(reconstruction: Reconstruction) -> Segments:
     """Detect the segments of every view and lift them to plane normals in the world."""
-    normals, sigmas, weights, views = [], [], [], []
+    normals: list[np.ndarray] = []
+    sigmas: list[np.ndarray] = []
+    weights: list[np.ndarray] = []
+    views: list[np.ndarray] = []
     for index, view in enumerate(reconstruction.views):
         segments = long_segments(view.rgb)
         if not len(segments):
             continue
-        first, second = (pixel_rays(segments[:, s], view.K) for s in (slice(0, 2), slice(2, 4)))
-        normal = np.cross(first, second)
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        length = np.hypot(segments[:, 2] - segments[:, 0], segments[:, 3] - segments[:, 1])
-        normals.append(normal @ view.camera_from_world[:3, :3])
-        sigmas.append(np.hypot(np.sqrt(2) * ENDPOINT_PX / length, STRUCTURE))
-        diagonal = np.hypot(*view.size)
-        weights.append(np.minimum(length / diagonal, 0.2) / 0.2)
+        lifted = lift(segments, view.K, view.camera_from_world[:3, :3], view.size)
+        for whole, part in zip((normals, sigmas, weights), lifted, strict=True):
+            whole.append(part)
         views.append(np.full(len(segments), index))
     if not normals:
         return Segments(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0, dtype=int))
