@@ -104,7 +104,8 @@ def _speed(options: argparse.Namespace) -> int:
         return EXIT_OK
     print(
         f"{speed.points} points in {speed.seconds:.2f} s with {speed.threads} threads ("
-        f"{speed.processor_s:.2f} s of processor time); the network alone {speed.network_s:.2f} s, written plainly {speed.plain_s:.2f} s\n"
+        f"{speed.processor_s:.2f} s of processor time)\n"
+        f"the network alone {speed.network_s:.2f} s, written plainly {speed.plain_s:.2f} s\n"
         f"{speed.giga_operations:.1f} billion operations, {speed.gflops:.0f} billion a second; "
         f"products of large matrices reach {speed.machine_gflops:.0f}\n"
         f"labels that differ between the two forms: {speed.most_label_changes:.4%}"

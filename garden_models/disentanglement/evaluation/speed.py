@@ -30,8 +30,8 @@ class Speed:
     """Seconds and operations of labelling one crop.
 
     ``processor_s`` is the processor time of all threads in ``seconds``: on a busy machine it
-    says more. ``network_s`` is the network's share of ``seconds``; the rest describes points. ``plain_s``
-    is the same network with attention written out (a matrix of distances by head).
+    says more. ``network_s`` is the network's share of ``seconds``; the rest describes points.
+    ``plain_s`` is the same network with attention written out (a matrix of distances by head).
     ``machine_gflops`` is what large products of matrices reach with as many threads.
     """
 
