@@ -1,4 +1,4 @@
-"""The random trials of ``python -m tests.faults``: a seeded few by default, all as slow tests."""
+"""The random trials of ``python -m tests.faults``, a seeded few of them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.faults import single_flight, soak
 from tests.faults.__main__ import report
 from tests.faults.forks import in_own_process
 from tests.faults.part import PARTS, Count
@@ -22,18 +21,8 @@ def test_no_dangling_orphans_only_when_writers_and_a_collector_are_killed(tmp_pa
     assert violations("soak", tmp_path, 20) == []
 
 
-@pytest.mark.slow
-def test_no_dangling_orphans_only_when_they_are_killed_often(tmp_path: Path) -> None:
-    assert violations("soak", tmp_path, soak.WHOLE) == []
-
-
 def test_locks_die_with_owners_two_workers_one_key(tmp_path: Path) -> None:
     assert violations("single_flight", tmp_path, 1) == []
-
-
-@pytest.mark.slow
-def test_locks_die_with_owners_two_workers_one_key_often(tmp_path: Path) -> None:
-    assert violations("single_flight", tmp_path, single_flight.WHOLE) == []
 
 
 def test_the_table_says_what_was_violated(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,6 +1,6 @@
 """SEALED, NO-DANGLING, ORPHANS-ONLY: whatever single call fails, nothing breaks, a rerun mends.
 
-``python -m tests.faults`` and the slow tests disturb every call; here it is a sample.
+``python -m tests.faults`` disturbs every call; here it is a sample.
 """
 
 from __future__ import annotations
@@ -16,27 +16,20 @@ from tests.storage.faulty import FaultyOs, disk
 SAMPLE = 4  # calls for each deed and way
 
 
-def violations(deed: Deed, folder: Path, *, every_call: bool) -> list[str]:
+def violations(deed: Deed, folder: Path) -> list[str]:
     trials = Trials(deed, folder)
     calls = len(trials.operations)
     assert calls > 20
     found: list[str] = []
     for number, how in enumerate(HOW):
-        step = 1 if every_call else calls // SAMPLE
-        for count in disturb(trials, how, range(0 if every_call else number, calls, step)):
+        for count in disturb(trials, how, range(number, calls, calls // SAMPLE)):
             found += count.violations
     return found
 
 
 @pytest.mark.parametrize("deed", DEEDS, ids=lambda d: d.name)
 def test_sealed_and_no_dangling_at_some_calls(tmp_path: Path, deed: Deed) -> None:
-    assert violations(deed, tmp_path, every_call=False) == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("deed", DEEDS, ids=lambda d: d.name)
-def test_sealed_and_no_dangling_at_every_call(tmp_path: Path, deed: Deed) -> None:
-    assert violations(deed, tmp_path, every_call=True) == []
+    assert violations(deed, tmp_path) == []
 
 
 @pytest.mark.parametrize("forgotten", ["members", "manifest", "folders"])
