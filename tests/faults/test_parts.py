@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
 
 import pytest
@@ -45,4 +46,6 @@ def test_a_module_that_breaks_is_a_violation() -> None:
 
 
 def test_what_is_here_is_registered() -> None:
+    for name in ("soak", "single_flight"):
+        importlib.import_module(f"tests.faults.{name}")
     assert {"soak", "single flight"} <= PARTS.keys()
