@@ -5,15 +5,33 @@ Degraded when the cues disagree or only a weak one stands.
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from garden_models.gravity import TRAINED
 from garden_models.gravity.config import AlignGravity
+from garden_models.gravity.decoder.shipped import DIGEST
 from garden_models.progress import Progress, silent
-from garden_models.scene import GravityView, Reconstruction
+from garden_models.scene import BadInput, GravityView, Reconstruction
 from tasks.step import step
+
+
+def _weights(config: AlignGravity, **_others: object) -> dict[str, str | Path]:
+    """Return the checkpoint of the decoder if it is asked: its content is part of the key."""
+    if not set(config.methods) & set(TRAINED):
+        return {}
+    if config.decoder_weights:
+        path = Path(config.decoder_weights)
+        if not path.is_file():
+            raise BadInput(f"no such checkpoint of a gravity decoder: {path}")
+        return {"gravity_decoder": path}
+    return {"gravity_decoder": DIGEST}
 
 
 @step(
     version=1,
-    packages=("numpy", "opencv-python-headless", "scipy"),
+    packages=("numpy", "opencv-python-headless", "scipy", "torch", "safetensors"),
+    weights=_weights,
+    skip=("config.decoder_weights",),
     modules=("garden_models.gravity",),  # methods are imported by their names
 )
 def align_gravity(

@@ -13,8 +13,11 @@ DESCRIPTION = """\
   garden train point-classifier --preset cpu       which scene points are an object's
   garden train point-classifier --gallery FILE     what its augmentations do, as a page
   garden train point-classifier --fit-stereo DIR   our stereo's noise, from a capture with truth
+  garden train gravity --preset cpu                where gravity is, from views of procedural rooms
+  garden train gravity --preset paper --backbone DIR --data tartanair=DIR hypersim=DIR vkitti2=DIR
+                                                   the paper's, on tokens of Depth-Anything-3
 
-Writes OUT/point_classifier.safetensors with record.json and record.html. Everything is kept in
+Writes OUT/NAME.safetensors with record.json and record.html. Everything is kept in
 the store: data by shards, the training by checkpoints. A training that was stopped or killed
 goes on from the last one and ends with the same weights."""
 
@@ -24,7 +27,7 @@ PRESETS = ("smoke", "cpu", "paper")
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.description = DESCRIPTION
-    parser.add_argument("name", choices=("point-classifier",))
+    parser.add_argument("name", choices=("point-classifier", "gravity"))
     parser.add_argument(
         "--preset",
         choices=PRESETS,
@@ -43,6 +46,19 @@ def configure(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="only fit the stereo-noise augmentation to a capture like tests/scenes/corner",
     )
+    parser.add_argument(
+        "--backbone",
+        metavar="FOLDER",
+        type=Path,
+        help="Depth-Anything-3's weights: learn gravity from its camera tokens (gravity)",
+    )
+    parser.add_argument(
+        "--data",
+        metavar="NAME=FOLDER",
+        nargs="+",
+        default=[],
+        help="data sets for --backbone: tartanair, hypersim, vkitti2 (gravity)",
+    )
     parser.add_argument("--engine", choices=("prefect", "local"), default="prefect")
 
 
@@ -59,6 +75,10 @@ def run(options: argparse.Namespace) -> int:
 
         print_json(dataclasses.asdict(fitted_stereo_noise(options.fit_stereo, open_store(options))))
         return EXIT_OK
+    if options.name == "gravity":
+        from flows.command.train_gravity import train_gravity
+
+        return train_gravity(options)
     return _train(options)
 
 

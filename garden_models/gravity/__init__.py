@@ -21,7 +21,11 @@ NAMES = (
     "plane_ransac",
     "normal_clustering",
     "manhattan_frame",
+    "mean_camera_up",
+    "view_decoder",
 )
+TRAINED = ("view_decoder",)
+"""Methods that read a checkpoint."""
 
 
 def _method(name: str) -> Method:
@@ -37,10 +41,11 @@ METHODS: dict[str, Callable[[Reconstruction], GravityEvidence | None]] = {
 }
 
 
-def read_cue(name: str, reconstruction: Reconstruction) -> Cue | None:
+def read_cue(name: str, reconstruction: Reconstruction, weights: str = "") -> Cue | None:
     """Return a method's reading for fusion; a method of one answer is read as one mode.
 
-    Raises BadInput for a name that ``METHODS`` does not hold.
+    ``weights`` is the checkpoint of a trained method; the shipped one if not given. Raises
+    BadInput for a name that ``METHODS`` does not hold.
     """
     from garden_models.gravity.protocol import cue_of_evidence
     from garden_models.scene import BadInput
@@ -48,6 +53,9 @@ def read_cue(name: str, reconstruction: Reconstruction) -> Cue | None:
     if name not in METHODS:
         raise BadInput(f"no gravity method is called {name!r}; there are {', '.join(METHODS)}")
     module = import_module(f"{__name__}.{name}")
+    if name in TRAINED:
+        trained: Cue | None = module.read(reconstruction, weights)
+        return trained
     if hasattr(module, "read"):
         cue: Cue | None = module.read(reconstruction)
         return cue

@@ -28,7 +28,7 @@ def align_gravity(
     cues: list[Cue] = []
     for done, name in enumerate(config.methods):
         progress(done / len(config.methods), f"gravity from {name.replace('_', ' ')}")
-        cue = read_cue(name, reconstruction)
+        cue = read_cue(name, reconstruction, config.decoder_weights)
         if cue is not None:
             cues.append(cue)
     fused = fuse_cues(tuple(cues), config.max_disagreement_deg)

@@ -9,10 +9,15 @@ from garden_models.scene import BadInput
 
 @dataclass(frozen=True)
 class AlignGravity:
-    """Which methods are asked, and from which disagreement on the result is degraded."""
+    """Which methods are asked, and from which disagreement on the result is degraded.
+
+    ``decoder_weights`` is the checkpoint that the method ``view_decoder`` reads; the shipped
+    one if empty.
+    """
 
     methods: tuple[str, ...] = ("planes", "vanishing_points", "camera_x_axes")
     max_disagreement_deg: float = 5.0
+    decoder_weights: str = ""
 
     def __post_init__(self) -> None:
         if not self.methods:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,8 +51,12 @@ def photographed(
     room_kind: RoomKind = RoomKind(),
     photographer: PhotographerKind = PhotographerKind(),
     size: tuple[int, int] = SIZE,
+    turned: float | None = None,
 ) -> Photographed:
-    """Return a random room with cameras that see something of it."""
+    """Return a random room with cameras that see something of it.
+
+    ``turned`` is the error of their rotations in radians; None leaves it to chance.
+    """
     room = furnish(rng, room_kind)
     focal = size[0] / (2 * np.tan(np.radians(rng.uniform(45, 78)) / 2))
     K = np.array([[focal, 0, size[0] / 2], [0, focal, size[1] / 2], [0, 0, 1]])
@@ -64,6 +69,8 @@ def photographed(
             break
         cameras = random_cameras(room, rng, photographer)
     errors = random_errors(rng)
+    if turned is not None:
+        errors = dataclasses.replace(errors, turned=turned)
     world_from_room = rigid(matrix_from_quaternion(rng.normal(size=4)), rng.normal(size=3))
     room_from_world = invert_rigid(world_from_room)
     measured = np.stack([_turned(camera, errors.turned, rng) for camera in cameras])

@@ -11,7 +11,8 @@ import torch
 from garden_models.geometry.rotation import axis_angle
 from garden_models.gravity.decoder.evidence import ViewEvidence, read_evidence
 from garden_models.gravity.decoder.start_frame import frame_of, habitual_down, starts
-from garden_models.gravity.decoder.tokens import TOKEN_WIDTH, evidence_batch, view_tokens
+from garden_models.gravity.decoder.token_layout import TOKEN_WIDTH
+from garden_models.gravity.decoder.tokens import evidence_batch, view_tokens
 from garden_models.gravity.training.scenes.furnish import RoomKind
 from garden_models.gravity.training.scenes.observe import photographed
 from garden_models.gravity.training.scenes.photograph import PHOTO_SIZE, photograph
@@ -79,7 +80,7 @@ def test_padding_changes_nothing(evidence, scene):
 @pytest.mark.parametrize("axis", [0, 2])
 def test_the_tilt_of_floor_and_edges_shows_how_far_down_is_off(evidence, scene, axis):
     """Turning the start frame by two degrees moves the tilts by as much, the right way."""
-    from garden_models.gravity.decoder import tokens as t
+    from garden_models.gravity.decoder import token_layout as t
 
     frame = frame_of(scene[1], evidence.rotation[evidence.reference])
     first = t.SPHERE + t.HALF_SPHERE
@@ -91,7 +92,7 @@ def test_the_tilt_of_floor_and_edges_shows_how_far_down_is_off(evidence, scene, 
         view_tokens(batch, torch.tensor(f[None], dtype=torch.float32))[0, 0].numpy()
         for f in (frame, start)
     ]
-    whole = sum(t._PARTS.values())
+    whole = sum(t.PARTS.values())
     normal_tilts = [
         row[whole + first : whole + lines].reshape(6, len(t.NORMAL_GATES), 3) for row in both
     ]
