@@ -1,4 +1,4 @@
-"""Measure depth and gravity on captures that come with ``cameras.json`` and ``depth/``."""
+"""Measure depth on captures that come with ``cameras.json`` and ``depth/``."""
 
 from __future__ import annotations
 
@@ -10,24 +10,20 @@ from typing import Any
 import numpy as np
 
 from flows.benchmark.plain_plane_sweep import plain_plane_sweep
-from flows.benchmark.truth import TrueCameras, read_true_cameras, read_true_depth
+from flows.benchmark.truth import read_true_cameras, read_true_depth
 from flows.capture import find_capture
 from flows.factorize import SceneRefs, factorize_scene
 from flows.preset import Preset
 from flows.report.values import SceneValues, load_values
 from flows.scene_run import SceneRequest, SceneResult
-from garden_models.metrics.camera_pose import true_from_estimated_rotation
 from garden_models.metrics.depth import DepthScore, score_depths, truth_at_view
-from garden_models.metrics.gravity import angular_error_deg
 from garden_models.reconstruction.densify import densify
 from garden_models.reconstruction.stereo_plan import plan_stereo
 from garden_models.reconstruction.undistort import working_views
-from garden_models.scene import Capture, GravityView, Reconstruction, SparseModel, Target, View
+from garden_models.scene import Capture, SparseModel, Target, View
 from garden_models.targets.boxes import parse_targets
 from storage import Store
-from tasks.align_gravity import align_gravity
 from tasks.ingest import ingest
-from tasks.reconstruct import reconstruct
 from tasks.register import register
 from tasks.step import Ref, RunContext, load, run_context
 
@@ -103,21 +99,6 @@ def _true_depth(folder: Path, view: View) -> np.ndarray:
     return truth_at_view(true, view.K, view.size, view.distortion)
 
 
-def gravity_row(folder: Path, store: Store) -> Row:
-    """Return the angle between our gravity and the true one, cameras given and estimated."""
-    truth = read_true_cameras(folder)
-    _, given = _upright(folder, store, given=True)
-    reconstruction, estimated = _upright(folder, store, given=False)
-    turn = _true_from_estimated(reconstruction, truth)
-    return {
-        "capture": folder.name,
-        "given deg": _off(given.down_world, -truth.up_in_transforms),
-        "given sigma": round(given.sigma_deg, 2),
-        "estimated deg": _off(turn @ estimated.down_world, -truth.up_world),
-        "estimated sigma": round(estimated.sigma_deg, 2),
-    }
-
-
 def table(rows: list[Row]) -> str:
     """Return rows as text columns."""
     if not rows:
@@ -136,23 +117,3 @@ def _registered(folder: Path, *, given: bool) -> list[tuple[Ref, Any]]:
     capture = find_capture(folder, folder / "transforms.json" if given else None)
     photos = ingest(capture.source, Preset().ingest)
     return [(photos, Capture), (register(photos, Preset().register), SparseModel)]
-
-
-def _upright(folder: Path, store: Store, *, given: bool) -> tuple[Reconstruction, GravityView]:
-    with run_context(RunContext(store=store, scene=folder.name)):
-        (photos, _), (cameras, _) = _registered(folder, given=given)
-        dense = reconstruct(photos, cameras, Preset().reconstruct)
-        upright = align_gravity(dense, Preset().gravity)
-        return load(dense, Reconstruction), load(upright, GravityView)
-
-
-def _true_from_estimated(reconstruction: Reconstruction, truth: TrueCameras) -> np.ndarray:
-    index = {photo: i for i, photo in enumerate(truth.photos)}
-    views = [view for view in reconstruction.views if view.photo in index]
-    estimated = np.stack([view.camera_from_world for view in views])
-    true = np.stack([truth.camera_from_world[index[view.photo]] for view in views])
-    return true_from_estimated_rotation(estimated, true)
-
-
-def _off(down: np.ndarray, true_down: np.ndarray) -> float:
-    return round(angular_error_deg(down, true_down), 2)

@@ -10,7 +10,7 @@ from flows.command import add_shared_options
 BENCHMARKS = {
     "sample": ("sample", "the sample capture against its exact truth, end to end"),
     "depth": ("captures", "depth beside a plain plane sweep: error and time"),
-    "gravity": ("captures", "gravity with cameras given and with cameras estimated"),
+    "gravity": ("gravity", "gravity beside every baseline: test scenes, captures with truth"),
     "classifier": ("classifier", "the point classifier beside box, distance, connectivity"),
     "latency": (
         "latency",

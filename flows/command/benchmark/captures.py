@@ -1,4 +1,4 @@
-"""``garden benchmark depth`` and ``gravity``: captures whose truth is known."""
+"""``garden benchmark depth``: captures whose truth is known."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from flows.command.store_option import open_store
 
 def configure(name: str, parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    truth = "cameras.json and depth/" if name == "depth" else "cameras.json"
     parser.add_argument(
-        "captures", nargs="+", type=Path, metavar="CAPTURE", help=f"a capture with {truth} as truth"
+        "captures",
+        nargs="+",
+        type=Path,
+        metavar="CAPTURE",
+        help="a capture with cameras.json and depth/ as truth",
     )
 
 
 def run(options: argparse.Namespace) -> int:
     """Print a table with a row, or one a method, for each capture."""
-    from flows.benchmark.captures import depth_rows, gravity_row, table
+    from flows.benchmark.captures import depth_rows, table
 
     store = open_store(options)
     rows = []
     for capture in options.captures:
         say(f"measuring {capture.name}")
-        if options.name == "depth":
-            rows += depth_rows(capture, store)
-        else:
-            rows.append(gravity_row(capture, store))
+        rows += depth_rows(capture, store)
     if options.json:
         print_json({"benchmark": options.name, "rows": rows})
     else:

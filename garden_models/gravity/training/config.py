@@ -72,10 +72,10 @@ SMOKE = GravityPreset(
     test_scenes=4,
     scenes_a_shard=60,
     test_scenes_a_shard=4,
-    checkpoint_every=100,
+    checkpoint_every=40,
     network=embedded_network(64, 2, 4, 128, 64),
     optimisation=GravityOptimisation(
-        steps=300, tokens_a_batch=96, learning_rate=1e-3, warm_up=30, decay=True
+        steps=200, tokens_a_batch=64, learning_rate=1e-3, warm_up=20, decay=True, threads=1
     ),
 )
 CPU = GravityPreset(
