@@ -71,7 +71,7 @@ def test_what_does_not_fit_is_refused(data, changes, message):
 
 
 def test_a_decoder_of_other_tokens_is_refused(data):
-    with pytest.raises(BadInput, match="tokens is .* train it again"):
+    with pytest.raises(BadInput, match=r"tokens is .* train it again"):
         from_bytes(data, "da3-giant", 3072)
 
 
