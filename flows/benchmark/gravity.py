@@ -51,7 +51,7 @@ def compare_gravity(
     """
     decoder = DecoderWeights(weights or b"")
     for folder in config.captures:
-        read_true_cameras(folder)
+        read_true_cameras(truth_folder(folder))
 
     def body() -> tuple[dict[str, Scored], dict[str, dict[str, Scored]]]:
         scores: dict[str, Scored] = {}
@@ -74,11 +74,20 @@ def compare_gravity(
     return run_training("benchmark-gravity", store, events, "local", body)
 
 
+def truth_folder(capture: Path) -> Path:
+    """Return where a capture's ``cameras.json`` and ``transforms.json`` are: beside the photos,
+    or in ``truth`` as the sample's.
+    """
+    inside = capture / "truth"
+    return inside if (inside / "cameras.json").is_file() else capture
+
+
 def _capture_errors(
     folder: Path, given: bool, decoder: DecoderWeights, geocalib: str
 ) -> GravityErrors:
-    truth = read_true_cameras(folder)
-    capture = find_capture(folder, folder / "transforms.json" if given else None)
+    known = truth_folder(folder)
+    truth = read_true_cameras(known)
+    capture = find_capture(folder, known / "transforms.json" if given else None)
     photos = ingest(capture.source, Preset().ingest, label=folder.name)
     cameras = register(photos, Preset().register, label=folder.name)
     dense = reconstruct(photos, cameras, Preset().reconstruct, label=folder.name)
