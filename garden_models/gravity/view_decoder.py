@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +22,6 @@ STRANGE_SPOILT = 0.6
 """Least probability of being wrong of an answer about something unlike all it learned from."""
 
 
-@lru_cache(maxsize=2)
 def checkpoint(weights: str = "") -> Checkpoint:
     """Return the decoder of a file, or the shipped one; raise BadInput if there is none."""
     path = Path(weights) if weights else checkpoint_file()

@@ -60,4 +60,4 @@ def test_plain_arguments_survive(step: Step) -> None:
 
 def test_what_reads_the_users_files_stays_where_they_are() -> None:
     here = {step.name for step in STEPS if step.spec.here}
-    assert here == {"ingest"}
+    assert here == {"ingest", "extract_gravity_tokens"}

@@ -15,7 +15,7 @@ ESTIMATED_CAMERAS_DEG = 0.3
 class Condition:
     """What rooms and photos are like; ``cameras_off_deg`` None leaves it to chance."""
 
-    name: str
+    name: str = "as they come"
     room: RoomKind = field(default_factory=RoomKind)
     photographer: PhotographerKind = field(default_factory=PhotographerKind)
     cameras_off_deg: float | None = None

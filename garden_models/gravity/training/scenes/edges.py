@@ -55,10 +55,10 @@ def all_edges(surfaces: Surfaces, rng: np.random.Generator) -> Ends:
 def _drawn(
     centre: np.ndarray, turn: np.ndarray, half: np.ndarray, rng: np.random.Generator
 ) -> list[np.ndarray]:
-    if rng.uniform() > 0.5:
+    if rng.uniform() > 0.6:
         return []
     drawn = []
-    for _ in range(int(rng.integers(1, 4))):
+    for _ in range(int(rng.integers(1, 6))):
         axis, side = int(rng.integers(3)), rng.choice([-1.001, 1.001])
         first, second = rng.uniform(-0.9, 0.9, (2, 3))
         if rng.uniform() < 0.6:  # along the face

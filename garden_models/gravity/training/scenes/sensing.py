@@ -46,8 +46,8 @@ def random_errors(rng: np.random.Generator) -> Errors:
         fine=float(np.exp(rng.uniform(np.log(0.0005), np.log(0.008)))),
         blank=float(rng.uniform(0, 0.5)),
         lost=float(rng.uniform(0, 0.35)),
-        missed=float(rng.uniform(0.05, 0.7)),
-        strays=int(rng.integers(0, 40)),
+        missed=float(rng.uniform(0.02, 0.6)),
+        strays=int(rng.integers(0, 70)),
         turned=float(np.radians(rng.choice([0.0, 0.1, 0.3]))),
     )
 
