@@ -44,7 +44,7 @@ def decode(model: GravityViewDecoder, evidence: ViewEvidence) -> Decoding:
             raise BadInput(f"the evidence for gravity ({name}) has values that are not finite")
     device = next(model.parameters()).device
     batch = evidence_batch([evidence]).to(device)
-    downs = starts(evidence.rotation, evidence.reference)
+    downs = starts(evidence)
     with torch.inference_mode():
         for _ in range(ROUNDS):
             downs, sigma, _ = _round(model, batch, evidence, downs)

@@ -6,6 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from garden_models.geometry.gravity_view import gv_from_camera
+from garden_models.gravity.decoder.evidence import ViewEvidence
+from garden_models.gravity.decoder.summits import summits
 
 Rotation = Float[np.ndarray, "3 3"]
 Direction = Float[np.ndarray, "3"]
@@ -28,12 +30,14 @@ def habitual_down(rotations: Float[np.ndarray, "v 3 3"], reference: int) -> Dire
     return np.asarray(mean / np.linalg.norm(mean))
 
 
-def starts(rotations: Float[np.ndarray, "v 3 3"], reference: int) -> Float[np.ndarray, "6 3"]:
-    """Return the habitual direction down, its opposite, and four level with it.
+def starts(evidence: ViewEvidence) -> Float[np.ndarray, "n 3"]:
+    """Return directions that may be down: the habitual one, its opposite, four level with it,
+    and both signs of every direction that surfaces or lines agree on.
 
-    Together they are within 55 degrees of every direction, so that also what was photographed
-    in no habitual way starts not far off.
+    The first six are within 55 degrees of every direction, so that also what was photographed
+    in no habitual way starts not far off; the others are often exact, or exactly wrong.
     """
-    frame = frame_of(habitual_down(rotations, reference), rotations[reference])
-    x, y, z = frame
-    return np.stack([y, -y, x, -x, z, -z])
+    rotation = evidence.rotation
+    frame = frame_of(habitual_down(rotation, evidence.reference), rotation[evidence.reference])
+    agreed = summits(evidence)
+    return np.concatenate([frame, -frame, agreed, -agreed])

@@ -14,6 +14,7 @@ from garden_models.geometry.gravity_view import gv_from_camera
 from garden_models.geometry.rotation import axis_angle, normalized
 from garden_models.gravity.decoder.evidence import ViewEvidence
 from garden_models.gravity.decoder.start_frame import frame_of
+from garden_models.gravity.decoder.summits import summits
 from garden_models.gravity.decoder.tokens import EvidenceBatch, evidence_batch
 from garden_models.gravity.training.config import GravityOptimisation
 from garden_models.gravity.training.shard import EvidenceShard
@@ -76,14 +77,17 @@ def some_views(scene: ViewEvidence, count: int, rng: np.random.Generator) -> Vie
 def wrong_down(down: Direction, scene: ViewEvidence, rng: np.random.Generator) -> Direction:
     """Return a start: near the truth as the last round's, rough as the first's, or anything."""
     chance = rng.uniform()
-    if chance < 0.5:
+    if chance < 0.4:
         return _tilted(down, NEAR * rng.normal(), rng)
-    if chance < 0.7:
+    if chance < 0.55:
         return _tilted(down, ROUGH * rng.normal(), rng)
     if chance < 0.9:
-        # What planes and cameras offer instead: a level direction, or up.
-        other = scene.rotation[int(rng.integers(len(scene))), int(rng.integers(3))]
-        return _tilted(other * rng.choice([-1.0, 1.0]), NEAR * rng.normal(), rng)
+        # What surfaces, lines and cameras offer instead: a level direction, or up.
+        offered = summits(scene) if rng.uniform() < 0.7 else np.zeros((0, 3))
+        if not len(offered):
+            offered = scene.rotation[int(rng.integers(len(scene)))]
+        other = offered[int(rng.integers(len(offered)))] * rng.choice([-1.0, 1.0])
+        return _tilted(other, NEAR * rng.normal(), rng)
     return normalized(rng.normal(size=3))
 
 

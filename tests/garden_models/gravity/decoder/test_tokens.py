@@ -110,10 +110,16 @@ def test_the_tilt_of_floor_and_edges_shows_how_far_down_is_off(evidence, scene, 
 
 
 def test_starts_reach_every_direction(evidence):
-    directions = starts(evidence.rotation, evidence.reference)
+    directions = starts(evidence)
     random = np.random.default_rng(0).normal(size=(1000, 3))
     random /= np.linalg.norm(random, axis=1, keepdims=True)
     assert np.degrees(np.arccos((random @ directions.T).max(axis=1))).max() < 55
+
+
+def test_some_start_is_gravity_almost_exactly(evidence, scene):
+    directions = starts(evidence)
+    assert np.degrees(np.arccos((directions @ scene[1]).max())) < 1.5
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1)
 
 
 def test_level_cameras_start_near_gravity(evidence, scene):
