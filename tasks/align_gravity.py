@@ -32,7 +32,6 @@ def _weights(config: AlignGravity, **_others: object) -> dict[str, str | Path]:
     packages=("numpy", "opencv-python-headless", "scipy", "torch", "safetensors"),
     weights=_weights,
     skip=("config.decoder_weights",),
-    modules=("garden_models.gravity",),  # methods are imported by their names
 )
 def align_gravity(
     reconstruction: Reconstruction, config: AlignGravity, progress: Progress = silent

@@ -16,7 +16,6 @@ from garden_models.scene import BadInput, Reconstruction
 from tasks.step import step
 
 _PACKAGES = ("torch", "numpy", "scipy", "opencv-python-headless")
-_MODULES = ("garden_models.gravity",)  # methods are imported by their names
 
 
 def _weights(geocalib: str, **_others: object) -> dict[str, str | Path]:
@@ -32,7 +31,6 @@ def _weights(geocalib: str, **_others: object) -> dict[str, str | Path]:
 @step(
     version=1,
     packages=_PACKAGES,
-    modules=_MODULES,
     weights=_weights,
     skip=("geocalib",),
     isolated=True,
@@ -55,7 +53,6 @@ def score_gravity_scenes(
 @step(
     version=1,
     packages=_PACKAGES,
-    modules=_MODULES,
     weights=_weights,
     skip=("geocalib",),
     isolated=True,

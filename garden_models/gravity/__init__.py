@@ -14,30 +14,32 @@ if TYPE_CHECKING:
     from garden_models.gravity.protocol import Cue, Method
     from garden_models.scene import GravityEvidence, Reconstruction
 
-NAMES = (
-    "planes",
-    "vanishing_points",
-    "camera_x_axes",
-    "plane_ransac",
-    "normal_clustering",
-    "manhattan_frame",
-    "mean_camera_up",
-    "view_decoder",
-)
+MODULES = {
+    "planes": "garden_models.gravity.planes",
+    "vanishing_points": "garden_models.gravity.vanishing_points",
+    "camera_x_axes": "garden_models.gravity.camera_x_axes",
+    "plane_ransac": "garden_models.gravity.plane_ransac",
+    "normal_clustering": "garden_models.gravity.normal_clustering",
+    "manhattan_frame": "garden_models.gravity.manhattan_frame",
+    "mean_camera_up": "garden_models.gravity.mean_camera_up",
+    "view_decoder": "garden_models.gravity.view_decoder",
+}
+"""Whole names, so that a step's key sees which code it reaches."""
+
 TRAINED = ("view_decoder",)
 """Methods that read a checkpoint."""
 
 
 def _method(name: str) -> Method:
     def estimate(reconstruction: Reconstruction) -> GravityEvidence | None:
-        found: GravityEvidence | None = import_module(f"{__name__}.{name}").estimate(reconstruction)
+        found: GravityEvidence | None = import_module(MODULES[name]).estimate(reconstruction)
         return found
 
     return estimate
 
 
 METHODS: dict[str, Callable[[Reconstruction], GravityEvidence | None]] = {
-    name: _method(name) for name in NAMES
+    name: _method(name) for name in MODULES
 }
 
 
@@ -52,7 +54,7 @@ def read_cue(name: str, reconstruction: Reconstruction, weights: str = "") -> Cu
 
     if name not in METHODS:
         raise BadInput(f"no gravity method is called {name!r}; there are {', '.join(METHODS)}")
-    module = import_module(f"{__name__}.{name}")
+    module = import_module(MODULES[name])
     if name in TRAINED:
         trained: Cue | None = module.read(reconstruction, weights)
         return trained

@@ -1,4 +1,4 @@
-"""Every registered method answers on a plain room, and the baselines are what they say."""
+"""Every cue answers on a plain room, and the baselines are what they say."""
 
 from __future__ import annotations
 
@@ -16,8 +16,12 @@ from garden_models.gravity import (
 from garden_models.scene import BadInput
 from tests.garden_models.gravity.synthetic_room import Room, cameras_only, make_room
 
+CUES = sorted(METHODS.keys() - {"mean_camera_up", "view_decoder"})
+"""The mean of the cameras always answers, and a decoder needs a checkpoint: they have tests of
+their own."""
 
-@pytest.mark.parametrize("name", METHODS)
+
+@pytest.mark.parametrize("name", CUES)
 def test_every_method_answers_on_a_plain_room(name: str) -> None:
     reconstruction, down = make_room(Room(seed=3))
     evidence = METHODS[name](reconstruction)
@@ -31,7 +35,7 @@ def test_every_method_answers_on_a_plain_room(name: str) -> None:
     assert cue.method == name
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", CUES)
 def test_every_method_survives_a_scene_without_evidence(name: str) -> None:
     reconstruction, _ = cameras_only(Room(photos=1))
     assert METHODS[name](reconstruction) is None
