@@ -29,7 +29,7 @@ def write_record(
     folder: Path, trained: TrainedDecoder, checkpoint: bytes, scores: Scores
 ) -> dict[str, Any]:
     """Write checkpoint, ``record.json`` and ``record.html``; return the record."""
-    from garden_models.gravity.decoder.checkpoint import digest_of
+    from garden_models.training.weights_file import weights_digest
 
     state: TrainingState = load(trained.state, TrainingState)
     known = None if trained.calibrated is None else load(trained.calibrated, Calibrated)
@@ -37,7 +37,7 @@ def write_record(
         "schema": "garden.training-record/1",
         "checkpoint": {
             "file": CHECKPOINT,
-            "digest": digest_of(checkpoint),
+            "digest": weights_digest(checkpoint),
             "bytes": len(checkpoint),
         },
         "preset": dataclasses.asdict(trained.preset),

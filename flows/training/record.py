@@ -31,14 +31,14 @@ def write_record(
     scores: dict[str, MethodScores],
 ) -> dict[str, Any]:
     """Write checkpoint, ``record.json`` and ``record.html``; return the record."""
-    from garden_models.disentanglement.network.checkpoint import digest_of
+    from garden_models.training.weights_file import weights_digest
 
     state: TrainingState = load(trained.state, TrainingState)
     record = {
         "schema": "garden.training-record/1",
         "checkpoint": {
             "file": CHECKPOINT,
-            "digest": digest_of(checkpoint),
+            "digest": weights_digest(checkpoint),
             "bytes": len(checkpoint),
         },
         "preset": dataclasses.asdict(trained.preset),

@@ -18,11 +18,6 @@ OPENCV_FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 LENSES = ("PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "PERSPECTIVE")
 
 
-def is_transforms(path: Path) -> bool:
-    """Tell whether a file is a nerfstudio ``transforms.json`` by its name."""
-    return path.suffix.lower() == ".json" and path.name.startswith("transforms")
-
-
 def read_transforms(path: Path) -> tuple[tuple[PosedCamera, ...], tuple[Path, ...]]:
     """Return the cameras of a ``transforms.json`` and the photo files it names.
 

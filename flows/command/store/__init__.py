@@ -3,20 +3,34 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 
-from flows.command import add_shared_options
+from flows.command.subcommands import add_subcommands, run_subcommand
 
 ACTIONS = {
-    "ls": ("listing", "every step that was computed: scene, verdict, seconds, size"),
-    "verify": ("checking", "re-hash every artifact and say what is broken and what to do"),
-    "repair": ("checking", "put what is broken into quarantine; it is made again when needed"),
-    "gc": ("collecting", "free room: remove what nothing needs, and what was not used for long"),
-    "pin": ("pinning", "hold results or whole scenes against gc, under a name"),
-    "unpin": ("pinning", "let go of what a pin held"),
-    "pins": ("pinning", "what is held, since when and why"),
-    "conflicts": ("listing", "results that came out different when made again"),
-    "compact": ("collecting", "write the table behind ls and reports anew, as one file"),
+    "ls": (
+        "flows.command.store.listing",
+        "every step that was computed: scene, verdict, seconds, size",
+    ),
+    "verify": (
+        "flows.command.store.checking",
+        "re-hash every artifact and say what is broken and what to do",
+    ),
+    "repair": (
+        "flows.command.store.checking",
+        "put what is broken into quarantine; it is made again when needed",
+    ),
+    "gc": (
+        "flows.command.store.collecting",
+        "free room: remove what nothing needs, and what was not used for long",
+    ),
+    "pin": ("flows.command.store.pinning", "hold results or whole scenes against gc, under a name"),
+    "unpin": ("flows.command.store.pinning", "let go of what a pin held"),
+    "pins": ("flows.command.store.pinning", "what is held, since when and why"),
+    "conflicts": ("flows.command.store.listing", "results that came out different when made again"),
+    "compact": (
+        "flows.command.store.collecting",
+        "write the table behind ls and reports anew, as one file",
+    ),
 }
 
 DESCRIPTION = """\
@@ -41,24 +55,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the actions and their options."""
     parser.description = DESCRIPTION
     parser.epilog = EPILOG
-    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
-    for name, (module, summary) in ACTIONS.items():
-        action = actions.add_parser(
-            name,
-            help=summary,
-            description=summary[0].upper() + summary[1:] + ".",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        _module(module).configure(name, action)
-        add_shared_options(action, nested=True)
+    add_subcommands(parser, ACTIONS, "action")
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the action; return the exit code."""
-    module, _summary = ACTIONS[options.action]
-    code: int = _module(module).run(options)
-    return code
-
-
-def _module(name: str):  # type: ignore[no-untyped-def]
-    return importlib.import_module(f"flows.command.store.{name}")
+    return run_subcommand(options, ACTIONS, "action")

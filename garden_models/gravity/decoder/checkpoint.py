@@ -8,28 +8,31 @@ trained on. A checkpoint that does not fit is refused.
 from __future__ import annotations
 
 import dataclasses
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import blake3
 import numpy as np
 import safetensors
-import safetensors.torch
-import torch
 
 from garden_models.gravity.decoder.config import DecoderConfig
 from garden_models.gravity.decoder.familiarity import Familiarity
 from garden_models.gravity.decoder.network import GravityViewDecoder
 from garden_models.gravity.decoder.uncertainty import Calibration
 from garden_models.scene import BadInput
+from garden_models.training.weights_file import (
+    pack_weights,
+    read_description,
+    read_weights_file,
+    unpack_weights,
+    weights_digest,
+)
 
 VERSION = 1
 """Raise it when the meaning of an output or of a weight changes."""
 ANGLE_UNIT = "radian"
 KIND = "gravity-view-decoder"
-_KEY = "garden"
+WHAT = "gravity decoder"
 
 
 @dataclass(frozen=True)
@@ -65,9 +68,7 @@ def to_bytes(
         "familiarity": None if familiarity is None else dataclasses.asdict(familiarity),
         "record": record,
     }
-    weights = {name: w.detach().cpu().contiguous() for name, w in model.state_dict().items()}
-    # One key: the order of several in the file is not defined.
-    return safetensors.torch.save(weights, {_KEY: json.dumps(description, sort_keys=True)})
+    return pack_weights(model, description)
 
 
 def load_checkpoint(path: Path, tokens: str, width: int, digest: str = "") -> Checkpoint:
@@ -76,36 +77,30 @@ def load_checkpoint(path: Path, tokens: str, width: int, digest: str = "") -> Ch
     Raises BadInput: no such file, another content, version or unit, other tokens, a network of
     another size, or weights that are not finite.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise BadInput(f"gravity decoder {path}: {error.strerror}") from error
-    if digest and digest_of(data) != digest:
-        raise BadInput(
-            f"gravity decoder {path} has the digest {digest_of(data)[:12]}, not the expected "
-            f"{digest[:12]}: restore the file"
-        )
-    return from_bytes(data, tokens, width, str(path))
+    return from_bytes(read_weights_file(path, digest, WHAT), tokens, width, str(path))
 
 
 def from_bytes(data: bytes, tokens: str, width: int, name: str = "checkpoint") -> Checkpoint:
     """Read a checkpoint from its bytes; raises BadInput as ``load_checkpoint``."""
-    description = _description(data, tokens, width, name)
+    expected = {
+        "kind": KIND,
+        "version": VERSION,
+        "unit": ANGLE_UNIT,
+        "tokens": {"kind": tokens, "width": width},
+    }
+    train = "garden train gravity"
+    description = read_description(data, expected, what=WHAT, name=name, train=train)
     try:
-        weights = safetensors.torch.load(data)
         model = GravityViewDecoder(DecoderConfig(**description["network"]))
-        model.load_state_dict(weights)
+        unpack_weights(data, model, what=WHAT, name=name)
         calibration = _known(Calibration, description["calibration"])
         familiarity = _known(Familiarity, description["familiarity"])
     except (TypeError, KeyError, RuntimeError, safetensors.SafetensorError) as error:
-        raise BadInput(f"gravity decoder {name}: its weights do not fit: {error}") from error
+        raise BadInput(f"{WHAT} {name}: its weights do not fit: {error}") from error
     if model.config.token_width != width or model.config.tokens != tokens:
-        raise BadInput(f"gravity decoder {name}: its network reads other tokens than it states")
-    bad = [key for key, weight in weights.items() if not torch.isfinite(weight).all()]
-    if bad:
-        raise BadInput(f"gravity decoder {name}: {bad[0]} holds values that are not finite")
+        raise BadInput(f"{WHAT} {name}: its network reads other tokens than it states")
     return Checkpoint(
-        model.eval(), calibration, familiarity, description["record"], digest_of(data)
+        model.eval(), calibration, familiarity, description["record"], weights_digest(data)
     )
 
 
@@ -122,34 +117,7 @@ def check_tokens(checkpoint: Checkpoint, tokens: np.ndarray) -> None:
         raise BadInput(f"the token of view {rows[0]} has values that are not finite")
 
 
-def digest_of(data: bytes) -> str:
-    """Return the digest by which a checkpoint is named."""
-    return str(blake3.blake3(data).hexdigest())
-
-
 def _known(kind: Any, values: dict[str, Any] | None) -> Any:
     if values is None:
         return None
     return kind(**{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})
-
-
-def _description(data: bytes, tokens: str, width: int, name: str) -> dict[str, Any]:
-    try:
-        length = int.from_bytes(data[:8], "little")
-        header = json.loads(data[8 : 8 + length])
-        description: dict[str, Any] = json.loads(header["__metadata__"][_KEY])
-    except (ValueError, KeyError, TypeError) as error:
-        raise BadInput(f"{name} is no checkpoint of a gravity decoder") from error
-    expected = {
-        "kind": KIND,
-        "version": VERSION,
-        "unit": ANGLE_UNIT,
-        "tokens": {"kind": tokens, "width": width},
-    }
-    for key, wanted in expected.items():
-        if description.get(key) != wanted:
-            raise BadInput(
-                f"gravity decoder {name}: {key} is {description.get(key)!r}, this program "
-                f"needs {wanted!r}: train it again with `garden train gravity`"
-            )
-    return description

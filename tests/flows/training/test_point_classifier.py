@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from flows.training.record import CHECKPOINT, PAGE, RECORD
-from garden_models.disentanglement.network.checkpoint import digest_of, load_checkpoint
+from garden_models.disentanglement.network.checkpoint import load_checkpoint
+from garden_models.training.weights_file import weights_digest
 
 ROOT = Path(__file__).parents[3]
 
@@ -53,7 +54,7 @@ def test_a_killed_training_ends_with_the_same_weights(tmp_path):
 def check_record(folder: Path, checkpoint: bytes) -> None:
     """The record says what went in and what came out."""
     record = json.loads((folder / RECORD).read_text())
-    assert record["checkpoint"]["digest"] == digest_of(checkpoint)
+    assert record["checkpoint"]["digest"] == weights_digest(checkpoint)
     assert record["steps"] == 6
     assert record["seed"] == 0
     assert record["preset"]["network"]["width"] == 16

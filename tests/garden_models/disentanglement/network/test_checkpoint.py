@@ -10,7 +10,6 @@ import safetensors.torch
 import torch
 
 from garden_models.disentanglement.network.checkpoint import (
-    digest_of,
     from_bytes,
     load_checkpoint,
     to_bytes,
@@ -21,6 +20,7 @@ from garden_models.disentanglement.network.model import PointClassifier
 from garden_models.disentanglement.network.shipped import DIGEST, checkpoint_file
 from garden_models.disentanglement.protocol import Crop, PlacedMesh, classifier
 from garden_models.scene import BadInput, PointCloud
+from garden_models.training.weights_file import weights_digest
 
 SMALL = NetworkConfig(width=32, token_layers=1, point_layers=1, scene_tokens=64, object_tokens=32)
 
@@ -55,7 +55,7 @@ def test_a_checkpoint_comes_back_as_it_was(tmp_path):
     assert data == to_bytes(made, {"preset": "smoke"})
     path = tmp_path / "a.safetensors"
     path.write_bytes(data)
-    read = load_checkpoint(path, digest_of(data))
+    read = load_checkpoint(path, weights_digest(data))
     assert read.record == {"preset": "smoke"}
     assert read.model.config == SMALL
     for name, weight in made.state_dict().items():

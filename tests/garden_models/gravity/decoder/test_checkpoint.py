@@ -11,7 +11,6 @@ import torch
 
 from garden_models.gravity.decoder.checkpoint import (
     check_tokens,
-    digest_of,
     from_bytes,
     load_checkpoint,
     to_bytes,
@@ -21,6 +20,7 @@ from garden_models.gravity.decoder.familiarity import Familiarity
 from garden_models.gravity.decoder.network import GravityViewDecoder
 from garden_models.gravity.decoder.uncertainty import Calibration
 from garden_models.scene import BadInput
+from garden_models.training.weights_file import weights_digest
 
 CONFIG = DecoderConfig(
     token_width=6, tokens="test/1", width=8, blocks=1, heads=2, feature=8, head=8, uncertain=True
@@ -50,7 +50,7 @@ def test_what_is_written_is_read(data):
     assert known.calibration == CALIBRATION
     assert known.familiarity == FAMILIAR
     assert known.record == {"preset": "test"}
-    assert known.digest == digest_of(data)
+    assert known.digest == weights_digest(data)
     assert to_bytes(known.model, known.calibration, known.familiarity, known.record) == data
 
 
@@ -93,7 +93,7 @@ def test_a_file_is_found_by_its_digest_only(data, tmp_path):
     with pytest.raises(BadInput, match="No such file"):
         load_checkpoint(path, "test/1", 6)
     path.write_bytes(data)
-    assert load_checkpoint(path, "test/1", 6, digest_of(data)).digest == digest_of(data)
+    assert load_checkpoint(path, "test/1", 6, weights_digest(data)).digest == weights_digest(data)
     with pytest.raises(BadInput, match="not the expected"):
         load_checkpoint(path, "test/1", 6, "0" * 64)
 
