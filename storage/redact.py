@@ -84,7 +84,7 @@ def secrets(environment: Mapping[str, str]) -> list[str]:
     found: set[str] = set()
     for name, value in environment.items():
         if _SECRET_NAME.search(name) and not _PATHS.search(name):
-            found |= _forms(value.strip())
+            found |= _forms(value.strip()) | (_forms(value) if value.strip() else set())
         if "://" in value:
             for user in _USER_INFO.findall(value):
                 found |= _forms(user.partition(":")[2])
