@@ -14,6 +14,7 @@ $(INSTALLED): pyproject.toml constraints.txt
 		{ echo "GARDEN needs Python 3.11 or newer; set PYTHON=/path/to/python3.11"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt --no-deps depth-anything-3
 	@touch $(INSTALLED)
 
 demo: install

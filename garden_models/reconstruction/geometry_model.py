@@ -1,0 +1,74 @@
+"""What a model that predicts cameras and depth is asked and answers, in our conventions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+
+@dataclass(frozen=True)
+class GeometryRequest:
+    """Photos, upright, of any sizes; cameras of all of them or of none.
+
+    ``K`` is in pixels of each photo (centres at +0.5), ``camera_from_world`` OpenCV.
+    """
+
+    SCHEMA: ClassVar[str] = "garden.GeometryRequest/1"
+    photos: tuple[UInt8[np.ndarray, "h w 3"], ...]
+    K: Float[np.ndarray, "n 3 3"] | None = None
+    camera_from_world: Float[np.ndarray, "n 3 4"] | None = None
+    want_gaussians: bool = False
+    want_tokens: bool = False
+
+
+@dataclass(frozen=True)
+class Gaussians:
+    """3D Gaussians in the world of the cameras that they come with.
+
+    ``scale`` is the standard deviation along each axis, ``rotation`` a unit quaternion wxyz
+    (world from Gaussian), ``opacity`` in 0..1, ``rgb`` the view-independent colour in 0..1.
+    """
+
+    SCHEMA: ClassVar[str] = "garden.Gaussians/1"
+    mean: Float[np.ndarray, "g 3"]
+    scale: Float[np.ndarray, "g 3"]
+    rotation: Float[np.ndarray, "g 4"]
+    opacity: Float[np.ndarray, " g"]
+    rgb: Float[np.ndarray, "g 3"]
+
+
+@dataclass(frozen=True)
+class GeometryView:
+    """One photo's prediction at the size that the model saw.
+
+    ``K`` is for that size; ``depth`` is z-depth, 0 where there is none; ``confidence`` is in
+    0..1. ``seen`` is False where the model saw nothing of the photo (it cuts photos to a
+    common shape); ``depth`` there is 0.
+    """
+
+    depth: Float[np.ndarray, "h w"]
+    confidence: Float[np.ndarray, "h w"]
+    seen: Bool[np.ndarray, "h w"]
+    K: Float[np.ndarray, "3 3"]
+    camera_from_world: Float[np.ndarray, "3 4"]
+
+
+@dataclass(frozen=True)
+class GeometryPrediction:
+    """Views in the order of the request, in one world; ``metric`` tells whether it is in
+    metres. ``reference`` is the view that the model took as its reference.
+    """
+
+    SCHEMA: ClassVar[str] = "garden.GeometryPrediction/1"
+    views: tuple[GeometryView, ...]
+    metric: bool
+    reference: int = 0
+    camera_tokens: Float[np.ndarray, "n c"] | None = None
+    gaussians: Gaussians | None = None
+
+
+PredictGeometry = Callable[[GeometryRequest], GeometryPrediction]
