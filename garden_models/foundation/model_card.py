@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The licences of code and weights; ``commercial`` tells whether both allow such use."""
+
+    code: str
+    weights: str
+    commercial: bool
 
 
 @dataclass(frozen=True)
@@ -17,7 +26,9 @@ class WeightFile:
 
 @dataclass(frozen=True)
 class ModelCard:
-    """One model. ``commercial`` tells whether code and weights both allow commercial use."""
+    """One model. Some come in variants whose terms differ: their weight folder's
+    ``config.json`` names the variant under ``variant_key``.
+    """
 
     name: str
     title: str
@@ -25,9 +36,9 @@ class ModelCard:
     """Where its code is published."""
 
     stage: Literal["reconstruct", "gravity", "targets", "segment", "mesh", "place"]
-    code_licence: str
-    weights_licence: str
-    commercial: bool
+    terms: Terms
+    """Of the model; of the strictest variant if there are any."""
+
     weights: tuple[WeightFile, ...]
     imports: tuple[str, ...]
     """Modules that must be importable in the model's environment."""
@@ -35,3 +46,10 @@ class ModelCard:
     devices: tuple[Literal["cpu", "cuda"], ...] = ("cpu", "cuda")
     install: str = ""
     """How to get the code, in one line."""
+
+    variant_key: str = ""
+    variants: dict[str, Terms] = field(default_factory=dict)
+
+    def terms_of(self, variant: str | None) -> Terms:
+        """Return a variant's terms; the strictest for one that is not known."""
+        return self.variants.get(variant or "", self.terms)
