@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flows.capture import FoundCapture, find_capture
+from flows.licence import Licence, check_licence
 from flows.preset import PRESETS, Preset
 from flows.scene_run import SceneRequest
 from flows.wrong_use import WrongUse
@@ -30,6 +31,7 @@ class SceneOptions:
     cameras: Path | None = None
     targets: Path | tuple[Target, ...] | None = None
     force: frozenset[str] = frozenset()
+    licence: Licence = "any"
 
 
 def read_scene(options: SceneOptions) -> SceneRequest:
@@ -37,6 +39,7 @@ def read_scene(options: SceneOptions) -> SceneRequest:
 
     Raises WrongUse, BadInput or UnreadableInput, which name the file and the remedy.
     """
+    check_licence(options.preset, options.licence)
     capture = find_capture(options.capture, options.cameras)
     name = check_name(options.name or capture.name, "scene")
     targets = _targets(options.targets, capture)

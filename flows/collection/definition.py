@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from flows.licence import Licence
 from flows.preset import PRESETS, Preset
 from flows.scene_request import SceneOptions, read_scene
 from flows.scene_run import SceneRequest
@@ -55,6 +56,7 @@ def read_collection(
     out: Path | None = None,
     preset: Preset | None = None,
     force: frozenset[str] = frozenset(),
+    licence: Licence = "any",
 ) -> Collection:
     """Read a collection and look at every capture, before any work starts.
 
@@ -63,6 +65,7 @@ def read_collection(
         out: where packages go; the file's ``out`` or ``scenes`` if not given.
         preset: the options of all steps; the file's if not given.
         force: steps that run even if cached, in every scene.
+        licence: which models' licences are accepted, in every scene.
 
     Raises:
         WrongUse, BadInput: the file has an error, or the folder no capture in it.
@@ -81,12 +84,12 @@ def read_collection(
         raise WrongUse(
             f"no such collection: {path}; give a TOML or YAML file or a folder of captures"
         )
-    scenes, unreadable = _look_at(entries, force)
+    scenes, unreadable = _look_at(entries, force, licence)
     return Collection(name, scenes, out, str(path), unreadable, remarks)
 
 
 def _look_at(
-    entries: Iterable[tuple[str, SceneOptions]], force: frozenset[str]
+    entries: Iterable[tuple[str, SceneOptions]], force: frozenset[str], licence: Licence
 ) -> tuple[tuple[SceneRequest, ...], tuple[UnreadableScene, ...]]:
     """Return the scenes that can be run, and those of which only the reason is known."""
     scenes, unreadable = [], []
@@ -94,7 +97,8 @@ def _look_at(
         try:
             if name in RESERVED:
                 raise BadInput(f"a scene cannot be called {name}, like a file of the collection")
-            scenes.append(read_scene(dataclasses.replace(options, name=name, force=force)))
+            asked = dataclasses.replace(options, name=name, force=force, licence=licence)
+            scenes.append(read_scene(asked))
         except (WrongUse, BadInput, UnreadableInput, OSError) as error:
             unreadable.append(UnreadableScene(name, str(error)))
     return tuple(scenes), tuple(unreadable)

@@ -10,6 +10,7 @@ from flows.collection.definition import Collection, read_collection
 from flows.collection.run import ONLY_FAILED, CollectionResult, chosen_names, run_collection
 from flows.collection.state import PAGE, read_state
 from flows.command import EXIT_FAILED, EXIT_OF_STATUS, EXIT_OK, print_json, say
+from flows.command.scene_options import add_licence_option
 from flows.command.store_option import open_store, store_address
 from flows.preset import read_preset
 from flows.step_runner import Runner, add_runner_options, step_runner
@@ -68,6 +69,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         dest="settings",
         help="change one option of --preset (embedded if not given), in place of the file's",
     )
+    add_licence_option(parser)
     parser.add_argument(
         "--force", action="append", default=[], metavar="STEP", help="run a step even if cached"
     )
@@ -96,6 +98,7 @@ def run(options: argparse.Namespace) -> int:
         out=options.out,
         preset=_preset(options),
         force=frozenset(options.force),
+        licence=options.licence,
     )
     for remark in collection.remarks:
         say(f"note: {remark}")

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from flows.command import say
+from flows.licence import LICENCES
 from flows.preset import read_preset
 from flows.scene_request import SceneOptions, read_scene
 from flows.scene_run import SceneRequest
@@ -49,8 +50,19 @@ def add_scene_options(parser: argparse.ArgumentParser) -> None:
         dest="settings",
         help="change one option of the preset, e.g. reconstruct.long_side=640",
     )
+    add_licence_option(parser)
     parser.add_argument(
         "--force", action="append", default=[], metavar="STEP", help="run a step even if cached"
+    )
+
+
+def add_licence_option(parser: argparse.ArgumentParser) -> None:
+    """Add the option that refuses models by their licence."""
+    parser.add_argument(
+        "--licence",
+        choices=LICENCES,
+        default="any",
+        help="permissive: refuse models whose code or weights forbid commercial use",
     )
 
 
@@ -65,6 +77,7 @@ def scene_request(options: argparse.Namespace) -> SceneRequest:
             cameras=Path(options.cameras) if options.cameras else None,
             targets=_targets(options),
             force=frozenset(options.force),
+            licence=options.licence,
         )
     )
     for remark in request.remarks:

@@ -36,7 +36,9 @@ def package_files(values: SceneValues) -> tuple[dict[str, bytes], Json]:
         "report.html": redact(report_page(values, document)).encode(),
         "timings.parquet": timings_parquet(document),
         "targets.json": dump_json(_targets(values)),
-        "LICENSES.json": dump_json(licences_document()),
+        "LICENSES.json": dump_json(
+            licences_document(step["backend"] or "" for step in document["steps"])
+        ),
     }
     if values.reconstruction is not None:
         files |= _camera_files(values) | _view_files(values)
