@@ -13,11 +13,11 @@ import time
 import uuid
 from pathlib import Path
 
-from flows.cache_folder import cache_folder
 from storage.digest import digest_file, hexadecimal
 from storage.formats.archive_name import MAX_BYTES, archive_stem
 from storage.formats.errors import UnreadableInput
 from storage.formats.limits import check_file_size
+from storage.user_folders import cache_folder
 
 KEPT_S = 14 * 86400.0
 

@@ -6,9 +6,9 @@ import argparse
 import os
 from pathlib import Path
 
-from flows.cache_folder import cache_folder
 from storage import Store
 from storage.address import is_remote
+from storage.user_folders import cache_folder
 
 
 def open_store(options: argparse.Namespace, create: bool = True) -> Store:

@@ -47,6 +47,9 @@ class ModelCard:
     install: str = ""
     """How to get the code, in one line."""
 
+    bfloat16: bool = True
+    """Whether it may run at this precision (torch's autocast)."""
+
     variant_key: str = ""
     variants: dict[str, Terms] = field(default_factory=dict)
 

@@ -4,7 +4,9 @@ The closure follows the import statements (those inside functions too) of first-
 modules from the step's own; a string constant that names a first-party module, as in a
 registry of lazy imports, counts as an import. Comments, docstrings and layout do not count.
 The step shell and the store are left out: they decide how results are kept, not what
-they are (``storage.formats`` does count: it reads what comes from outside).
+they are (``storage.formats`` does count: it reads what comes from outside). So is what runs
+models, and their registry, which names them all: a step counts the model that it uses by
+``tasks.model.weights_of``.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from pathlib import Path
 from storage.digest import digest_bytes, digest_value
 
 FIRST_PARTY = ("garden_models", "tasks", "storage")
+_REGISTRY = "garden_models.foundation"
 _SPECIAL = (ast.Import, ast.ImportFrom, ast.Constant)
 _MODULE_NAME = re.compile(r"[A-Za-z_]\w*(\.\w+)+(:\w+)?")
 
@@ -95,8 +98,10 @@ def _parents(name: str) -> list[str]:
 def _left_out(name: str) -> bool:
     package, _, rest = name.partition(".")
     inside = rest.partition(".")[0]
+    if name == _REGISTRY:
+        return True
     if package == "tasks":
-        return inside == "step"
+        return inside in ("step", "model", "model_worker")
     return package == "storage" and inside != "formats"
 
 

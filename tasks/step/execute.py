@@ -12,6 +12,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from garden_models.foundation.failure import ModelFailed, ModelOutOfMemory
 from garden_models.scene import BadGeometry, BadInput
 from storage import ActionRecord, CorruptArtifact, MissingArtifact, Output, StoreError
 from storage.redact import redact
@@ -48,6 +49,8 @@ _SPEAKING = (
     MemoryLimit,
     StepCrashed,
     Cancelled,
+    ModelFailed,
+    ModelOutOfMemory,
 )
 HIT = Why("hit", "found in the store")
 LONGEST_WAIT_S = 6 * 3600.0

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from garden_models import scene
+from garden_models.foundation import failure
 from storage import CorruptArtifact, Published, errors
 from storage.redact import redact
 from tasks.step.compute import Done
@@ -65,7 +66,8 @@ def compute_isolated(
         TimeLimit, MemoryLimit: it was killed for that.
         StepCrashed: it died by itself, or raised an error of an unknown kind.
         Cancelled: the run was stopped.
-        BadInput, BadGeometry, MemoryError, OSError, StoreError: as raised in the child.
+        BadInput, BadGeometry, MemoryError, OSError, StoreError, ModelFailed: as raised in
+            the child.
     """
     order = write_order(context, step, arguments, label) | {"path": sys.path}
     with context.store.scratch() as folder, _child(folder, order, gpus) as child:
@@ -215,6 +217,9 @@ def _rebuild(error: dict[str, Any]) -> Exception:
         return store_error(message)
     if kind == "MemoryError":
         return MemoryError(message)
+    if kind in ("ModelFailed", "ModelOutOfMemory"):
+        model_error: type[Exception] = getattr(failure, kind)
+        return model_error(message)
     if error.get("errno") is not None:
         return OSError(error["errno"], message)
     crashed = StepCrashed(f"{kind}: {message}")

@@ -1,0 +1,41 @@
+"""Say all that it takes to load one model here, and what tells it from another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from garden_models import foundation
+from tasks.model.settings import Dtype, device_of, model_settings
+from tasks.model.weights import stamp_of
+
+
+@dataclass(frozen=True)
+class Launch:
+    """One model on one device. ``stamp`` changes when its weight files do."""
+
+    name: str
+    module: str
+    weights: Path
+    device: str
+    python: Path | None
+    time_limit_s: float
+    memory_limit_gb: float | None
+    dtype: Dtype
+    stamp: str
+
+
+def launch_of(name: str) -> Launch:
+    """Return how a model is loaded; BadInput if it cannot be, with what is missing."""
+    settings = model_settings(name)
+    return Launch(
+        name=name,
+        module=foundation.ADAPTERS[name],
+        weights=settings.weights,
+        device=device_of(name, settings),
+        python=settings.python,
+        time_limit_s=settings.time_limit_s,
+        memory_limit_gb=settings.memory_limit_gb,
+        dtype=settings.dtype,
+        stamp=stamp_of(name),
+    )
