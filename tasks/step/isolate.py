@@ -7,27 +7,22 @@ memory, or the run is stopped, and it dies with its parent.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
-import select
-import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from garden_models import scene
 from garden_models.foundation import failure
 from storage import CorruptArtifact, Published, errors
-from storage.redact import redact
+from tasks.step.child_process import ChildProcess
 from tasks.step.compute import Done
 from tasks.step.inputs import Arguments
-from tasks.step.memory import Peak, session_rss
 from tasks.step.order import write_order
 from tasks.step.ref import Cancelled, MemoryLimit, Seconds, StepCrashed, TimeLimit
 from tasks.step.run import RunContext
@@ -36,9 +31,6 @@ if TYPE_CHECKING:
     from tasks.step import Step
 
 _POLL_S = 0.1
-_WEIGH_EVERY_S = 0.3
-_TAIL_CHARACTERS = 2000
-_READ_BYTES = 1 << 16
 _STORE_ERRORS = {
     "MissingArtifact",
     "SchemaMismatch",
@@ -83,36 +75,8 @@ def compute_isolated(
     )
 
 
-@dataclass
-class _Child:
-    process: subprocess.Popen[bytes]
-    answers: int  # descriptor of the pipe on which the child speaks
-    output: Path  # what it, and its libraries, print
-    started: float = field(default_factory=time.monotonic)
-    peak: Peak = field(default_factory=Peak)
-    weigh_at: float = 0.0  # when its memory is looked at next
-    buffer: bytes = b""
-    silent: bool = False  # it has closed its end of the pipe
-
-    def tail(self) -> str:
-        """Return the end of what the child printed, cut after secrets are out of it."""
-        try:
-            with self.output.open("rb") as printed:
-                printed.seek(max(0, self.output.stat().st_size - _READ_BYTES))
-                text = printed.read().decode(errors="replace")
-        except OSError:
-            return ""
-        return redact(text)[-_TAIL_CHARACTERS:].strip()
-
-    def kill(self) -> None:
-        """End the child and all that it started."""
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(self.process.pid, signal.SIGKILL)
-        self.process.wait()
-
-
 @contextmanager
-def _child(folder: Path, order: dict[str, Any], gpus: tuple[str, ...]) -> Iterator[_Child]:
+def _child(folder: Path, order: dict[str, Any], gpus: tuple[str, ...]) -> Iterator[ChildProcess]:
     reading, writing = os.pipe()
     output = folder / "output.txt"
     (folder / "order.json").write_text(json.dumps(order))
@@ -134,7 +98,7 @@ def _child(folder: Path, order: dict[str, Any], gpus: tuple[str, ...]) -> Iterat
             )
     finally:
         os.close(writing)
-    child = _Child(process, reading, output)
+    child = ChildProcess(process, reading, output)
     try:
         yield child
     finally:
@@ -143,65 +107,35 @@ def _child(folder: Path, order: dict[str, Any], gpus: tuple[str, ...]) -> Iterat
 
 
 def _listen(
-    context: RunContext, step: Step, child: _Child, report: Callable[[float, str], None]
+    context: RunContext, step: Step, child: ChildProcess, report: Callable[[float, str], None]
 ) -> dict[str, Any]:
     """Pass on progress until the child gives its answer; kill it when it must end."""
     while True:
-        for message in _messages(child):
+        for message in child.messages(_POLL_S):
             if "progress" in message:
                 report(*message["progress"])
             else:
                 return message
         if child.silent:
-            raise StepCrashed(_how_it_died(child))
+            raise StepCrashed(child.how_it_died())
         _check_limits(context, step, child)
 
 
-def _messages(child: _Child) -> Iterator[dict[str, Any]]:
-    ready, _, _ = select.select([child.answers], [], [], _POLL_S)
-    if not ready:
-        return
-    data = os.read(child.answers, 1 << 16)
-    if not data:
-        child.silent = True
-        return
-    *lines, child.buffer = (child.buffer + data).split(b"\n")
-    for line in lines:
-        yield json.loads(line)
-
-
-def _check_limits(context: RunContext, step: Step, child: _Child) -> None:
+def _check_limits(context: RunContext, step: Step, child: ChildProcess) -> None:
     if context.cancelled.is_set():
         raise Cancelled("the run was stopped")
     limit_s, limit_gb = step.spec.time_limit_s, step.spec.memory_limit_gb
-    now = time.monotonic()
-    if limit_s is not None and now - child.started > limit_s:
+    if limit_s is not None and time.monotonic() - child.started > limit_s:
         raise TimeLimit(
             f"stopped after {limit_s:g} s, its time limit: use fewer or smaller photos,"
             " or raise the limit"
         )
-    if now < child.weigh_at:
-        return
-    child.weigh_at = now + _WEIGH_EVERY_S
-    child.peak.see(session_rss(child.process.pid))
+    child.weigh()
     if limit_gb is not None and child.peak.mb > limit_gb * 1000:
         raise MemoryLimit(
             f"stopped at {child.peak.mb / 1000:.1f} GB, above its memory limit of"
             f" {limit_gb:g} GB: use fewer or smaller photos, or raise the limit"
         )
-
-
-def _how_it_died(child: _Child) -> str:
-    try:
-        code = child.process.wait(timeout=5.0)
-    except subprocess.TimeoutExpired:
-        return "its process closed the connection without a result"
-    if code < 0:
-        how = f"its process was ended by {signal.Signals(-code).name}"
-    else:
-        how = f"its process ended with code {code} and no result"
-    tail = child.tail()
-    return f"{how}; it printed last: {tail}" if tail else how
 
 
 def _rebuild(error: dict[str, Any]) -> Exception:
