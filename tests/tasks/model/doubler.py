@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from garden_models.foundation.model_card import ModelCard, WeightFile
+from garden_models.foundation.model_card import ModelCard, Terms, WeightFile
 from garden_models.scene import BadInput
 from tests.tasks.model.nouns import Answer, Ask, Part, Question
 
@@ -16,9 +16,7 @@ CARD = ModelCard(
     title="Doubler",
     source="here",
     stage="segment",
-    code_licence="Apache-2.0",
-    weights_licence="Apache-2.0",
-    commercial=True,
+    terms=Terms("Apache-2.0", "Apache-2.0", commercial=True),
     weights=(WeightFile("factor.txt", "a number"), WeightFile("more/")),
     imports=("numpy",),
 )
