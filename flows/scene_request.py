@@ -10,6 +10,7 @@ from flows.licence import Licence, check_licence
 from flows.preset import PRESETS, Preset
 from flows.scene_run import SceneRequest
 from flows.wrong_use import WrongUse
+from garden_models.foundation import card
 from garden_models.scene import Target
 from garden_models.targets.boxes import check_name, parse_targets, validate
 from storage.formats.errors import UnreadableInput
@@ -39,7 +40,7 @@ def read_scene(options: SceneOptions) -> SceneRequest:
 
     Raises WrongUse, BadInput or UnreadableInput, which name the file and the remedy.
     """
-    check_licence(options.preset, options.licence)
+    check_licence(options.preset, options.licence, _variant)
     capture = find_capture(options.capture, options.cameras)
     name = check_name(options.name or capture.name, "scene")
     targets = _targets(options.targets, capture)
@@ -54,6 +55,14 @@ def read_scene(options: SceneOptions) -> SceneRequest:
         remarks=_remarks(capture, targets),
         force=options.force,
     )
+
+
+def _variant(name: str) -> str | None:
+    """Return which variant of a model this machine has."""
+    from tasks.model.found import variant_of
+    from tasks.model.settings import model_settings
+
+    return variant_of(card(name), model_settings(name).weights)
 
 
 def _targets(given: Path | tuple[Target, ...] | None, capture: FoundCapture) -> tuple[Target, ...]:

@@ -8,12 +8,16 @@ import platform
 import shutil
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 from flows.command import EXIT_FAILED, EXIT_OK, print_json
 from flows.command.store_option import store_address
+from garden_models.foundation import ADAPTERS
 from storage import StoreError
 from storage.address import find_medium, is_remote
 from storage.store import MARKER
+from tasks.model.found import FoundModel, found_model
+from tasks.model.settings import settings_file
 
 PACKAGES = (
     "torch", "prefect", "fastapi", "zarr", "pyarrow", "pycolmap", "mujoco", "trimesh",
@@ -24,23 +28,62 @@ NEEDED_GB_MEMORY, NEEDED_GB_DISK = 5.0, 2.0
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
-    parser.description = "Tell what this machine can run, and what is missing and why it matters."
+    parser.description = (
+        "Tell what this machine can run, what is missing, and where it goes. The embedded"
+        " backends need none of the paper's models."
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit code."""
     findings = [*_packages(), _cores(), _memory(), _store(options), _gpu()]
     broken = [f for f in findings if f["state"] == "missing"]
+    models = [found_model(name) for name in ADAPTERS]
     if options.json:
-        print_json({"status": "failed" if broken else "ok", "findings": findings})
+        status = "failed" if broken else "ok"
+        print_json({"status": status, "findings": findings, "models": [_model(m) for m in models]})
     else:
         for finding in findings:
             print(f"{finding['state']:<8} {finding['what']:<26} {finding['note']}")
+        print(f"\nThe paper's models (settings: {settings_file()})")
+        for model in models:
+            _tell(model)
     return EXIT_FAILED if broken else EXIT_OK
 
 
 def _finding(what: str, state: str, note: str) -> dict[str, str]:
     return {"what": what, "state": state, "note": note}
+
+
+def _model(found: FoundModel) -> dict[str, Any]:
+    return {
+        "name": found.card.name,
+        "title": found.card.title,
+        "stage": found.card.stage,
+        "state": found.state,
+        "variant": found.variant,
+        "weights": str(found.weights or ""),
+        "digest": found.digest,
+        "device": found.device,
+        "environment": found.environment,
+        "code_licence": found.terms.code,
+        "weights_licence": found.terms.weights,
+        "commercial_use": found.terms.commercial,
+        "problems": list(found.problems),
+    }
+
+
+def _tell(found: FoundModel) -> None:
+    """Print a model: its state, its terms, its weights, and what is missing."""
+    card, terms = found.card, found.terms
+    use = "commercial use allowed" if terms.commercial else "no commercial use"
+    name = f"{card.name}/{found.variant}" if found.variant else card.name
+    print(f"{found.state:<8} {name:<26} {card.title}, for the step {card.stage}")
+    print(f"{'':<35} code {terms.code}, weights {terms.weights}: {use}")
+    if found.digest:
+        print(f"{'':<35} {found.weights} ({found.digest}) on {found.device or 'no device'}")
+    for problem in found.problems:
+        print(f"{'':<35} {problem}")
 
 
 def _packages() -> list[dict[str, str]]:
@@ -91,5 +134,9 @@ def _gpu() -> dict[str, str]:
     import torch
 
     if torch.cuda.is_available():
-        return _finding("gpu", "ok", torch.cuda.get_device_name(0))
+        names = []
+        for i in range(torch.cuda.device_count()):
+            about = torch.cuda.get_device_properties(i)
+            names.append(f"{about.name}, {about.total_memory / 1e9:.0f} GB")
+        return _finding("gpu", "ok", "; ".join(names))
     return _finding("gpu", "none", "the embedded backends run on the CPU")
