@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import accumulate
 from pathlib import Path
 
 import pytest
@@ -69,17 +70,18 @@ def orders_that_fail(scenes: int, objects: int) -> list[JobOrder]:
     return [JobOrder(f"scene_{n:06}", job, {"number": n}) for n in (1,)]
 
 
-def measured(scene_s: list[float], ours_mb: list[int], restart_s: float = 1.0) -> ScaleResult:
+def measured(cpu_s: list[float], ours_mb: list[int], restart_s: float = 1.0) -> ScaleResult:
     """Return a run in which scene ``i`` ended at second ``i + 1``, with one sample a second."""
+    spent = [0.0, *accumulate(cpu_s)]
     samples = [
-        Sample(i + 0.5, Usage(0.1 * i, 50 * MB, 1), Usage(i, (mb - 50) * MB, 2), Usage(0, 0, 0))
+        Sample(i + 0.5, Usage(1.0, 50 * MB, 1), Usage(spent[i], (mb - 50) * MB, 2), Usage(0, 0, 0))
         for i, mb in enumerate(ours_mb)
     ]
-    finished = [FinishedScene(i + 1.0, seconds) for i, seconds in enumerate(scene_s)]
-    options = ScaleOptions(len(scene_s), 5, "local")
+    finished = [FinishedScene(i + 1.0, 2.0) for i in range(len(cpu_s))]
+    options = ScaleOptions(len(cpu_s), 5, "local")
     restart = Restart(restart_s, 0, options.steps)
     store = {"objects": Growth(10, 5, 1000, 4096), "actions": Growth(2, 1, 100, 4096)}
-    return ScaleResult(options, 0.0, float(len(scene_s)), finished, samples, store, restart, 600)
+    return ScaleResult(options, 0.0, float(len(cpu_s)), finished, samples, store, restart, 600)
 
 
 def test_the_last_block_is_held_against_the_first() -> None:
