@@ -19,8 +19,6 @@ from tasks.score_point_classifier import score_baselines, score_point_classifier
 from tasks.step import Ref, load
 from tasks.train_point_classifier import start_point_classifier, train_point_classifier
 
-SETTINGS = ("clean", "augmented")
-
 
 @dataclass(frozen=True)
 class TrainedClassifier:
@@ -47,7 +45,7 @@ class EvaluationPairs:
 
 def train(preset: TrainingPreset) -> TrainedClassifier:
     """Train by a preset, or find the training in the store. Raises StepFailed."""
-    pairs = shards("train", preset.rooms, preset, preset.pairs)
+    pairs = shards("train", "augmented", preset.rooms, preset, preset.pairs)
     described = each(lambda shard: describe_training_pairs(shard, preset.network), pairs)
     states = checkpoints(
         start_point_classifier(preset.network, preset.optimisation),
@@ -61,37 +59,36 @@ def train(preset: TrainingPreset) -> TrainedClassifier:
 
 
 def shards(
-    split: Split, rooms: int, preset: TrainingPreset, config: PairsConfig
+    split: Split, setting: str, rooms: int, preset: TrainingPreset, config: PairsConfig
 ) -> tuple[Ref, ...]:
     """Make a split's pairs, some rooms a shard."""
     starts = range(0, rooms, preset.rooms_a_shard)
-    kind = "augmented" if config.augmented else "clean"
 
     def make(start: int) -> Ref:
         count = min(preset.rooms_a_shard, rooms - start)
         return make_training_pairs(
-            split, start, count, config, preset.packages, label=f"{split} {kind} {start}"
+            split, start, count, config, preset.packages, label=f"{split} {setting} {start}"
         )
 
     return each(make, starts)
 
 
 def evaluation_pairs(preset: TrainingPreset) -> dict[str, EvaluationPairs]:
-    """Make the held-out pairs: clean, and with every augmentation at full strength."""
-    full = dataclasses.replace(preset.pairs.augmentations, each=1.0)
-    jitter = dataclasses.replace(full.mesh_jitter, gentle=0.0)
+    """Make the held-out pairs: clean; augmented as in training (supplement B: the same pipeline
+    for training and test); and with every augmentation at once, at full strength.
+    """
+    own = preset.pairs.augmentations
+    jitter = dataclasses.replace(own.mesh_jitter, gentle=0.0)
+    full = dataclasses.replace(own, each=1.0, mesh_jitter=jitter)
     configs = {
         "clean": dataclasses.replace(preset.pairs, augmentations=NONE, augmented=0.0),
-        "augmented": dataclasses.replace(
-            preset.pairs,
-            augmentations=dataclasses.replace(full, mesh_jitter=jitter),
-            augmented=1.0,
-        ),
+        "augmented": dataclasses.replace(preset.pairs, augmented=1.0),
+        "full strength": dataclasses.replace(preset.pairs, augmentations=full, augmented=1.0),
     }
     return {
         setting: EvaluationPairs(
-            shards("validation", preset.validation_rooms, preset, config),
-            shards("test", preset.test_rooms, preset, config),
+            shards("validation", setting, preset.validation_rooms, preset, config),
+            shards("test", setting, preset.test_rooms, preset, config),
         )
         for setting, config in configs.items()
     }

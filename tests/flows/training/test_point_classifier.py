@@ -61,7 +61,7 @@ def check_record(folder: Path, checkpoint: bytes) -> None:
     assert all(record["data"].values())
     assert record["hours"]["total"] >= 0
     assert record["hardware"]["torch"]
-    assert set(record["scores"]) == {"clean", "augmented"}
+    assert set(record["scores"]) == {"clean", "augmented", "full strength"}
     for scores in record["scores"].values():
         methods = [score["method"] for score in scores["scores"]]
         assert methods == ["network", "box crop", "distance to mesh", "connected components"]
