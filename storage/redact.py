@@ -79,16 +79,29 @@ def _redact(text: str, known: list[str]) -> str:
     return _BEARER.sub(rf"\1{HIDDEN}", text)
 
 
+def without_secret_variables(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return an environment less the variables that hold secrets, for programs that need none."""
+    return {
+        name: value
+        for name, value in environment.items()
+        if not _is_secret(name) and not secrets({name: value})
+    }
+
+
 def secrets(environment: Mapping[str, str]) -> list[str]:
     """Return the secrets in an environment in all forms they are written in, longest first."""
     found: set[str] = set()
     for name, value in environment.items():
-        if _SECRET_NAME.search(name) and not _PATHS.search(name):
+        if _is_secret(name):
             found |= _forms(value.strip()) | (_forms(value) if value.strip() else set())
         if "://" in value:
             for user in _USER_INFO.findall(value):
                 found |= _forms(user.partition(":")[2])
     return sorted(found, key=len, reverse=True)
+
+
+def _is_secret(name: str) -> bool:
+    return _SECRET_NAME.search(name) is not None and _PATHS.search(name) is None
 
 
 def _forms(secret: str) -> set[str]:

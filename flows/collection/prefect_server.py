@@ -15,7 +15,7 @@ import sys
 import time
 
 from flows.server_profile import SERVER_PROFILES
-from tasks.step.child import die_with
+from tasks.parent_process import die_with
 
 START_S = 180.0
 

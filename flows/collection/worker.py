@@ -16,7 +16,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from tasks.step.child import Answers, die_with
+from tasks.parent_process import Answers, die_with
 
 
 @dataclass(frozen=True)

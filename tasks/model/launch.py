@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from garden_models import foundation
 from tasks.model.settings import Dtype, device_of, model_settings
@@ -18,7 +20,7 @@ class Launch:
     module: str
     weights: Path
     device: str
-    python: Path | None
+    python: tuple[str, ...] | None
     time_limit_s: float
     memory_limit_gb: float | None
     dtype: Dtype
@@ -38,4 +40,21 @@ def launch_of(name: str) -> Launch:
         memory_limit_gb=settings.memory_limit_gb,
         dtype=settings.dtype,
         stamp=stamp_of(name),
+    )
+
+
+def launch_to_json(launch: Launch) -> dict[str, Any]:
+    """Return a launch as plain JSON."""
+    return dataclasses.asdict(launch) | {"weights": str(launch.weights)}
+
+
+def launch_from_json(document: dict[str, Any]) -> Launch:
+    """Read what ``launch_to_json`` gave."""
+    python = document["python"]
+    return Launch(
+        **document
+        | {
+            "weights": Path(document["weights"]),
+            "python": None if python is None else tuple(python),
+        }
     )

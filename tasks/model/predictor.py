@@ -6,15 +6,21 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from garden_models.progress import Progress, silent
+from tasks.model.checked import check_answer
+from tasks.model.keeper_client import KeeperClient, keeper_address
 from tasks.model.launch import launch_of
 from tasks.model.resident import residents
+from tasks.model_worker.nouns import nouns_of
+from tasks.step.run import is_stopped
 
 
 @contextmanager
-def predictor(name: str) -> Iterator[Callable[[Any], Any]]:
+def predictor(name: str, progress: Progress = silent) -> Iterator[Callable[[Any], Any]]:
     """Give what asks a model: called with a request, it returns the answer.
 
     The model is loaded at the first call, and stays loaded until another one needs its device.
+    The same request has the same answer, whatever was asked before.
 
     Raises:
         BadInput: there is no such model, or what it needs is not here; says what to do.
@@ -22,8 +28,26 @@ def predictor(name: str) -> Iterator[Callable[[Any], Any]]:
         ModelFailed: (of a call) it gave no usable answer.
     """
     launch = launch_of(name)
+    _request, expected = nouns_of(launch.module)
+    with _asking() as ask:
 
-    def predict(request: Any) -> Any:
-        return residents.call(launch, request)
+        def predict(request: Any) -> Any:
+            answer = ask(launch, request, progress, is_stopped)
+            check_answer(name, request, answer, expected)
+            return answer
 
-    yield predict
+        yield predict
+
+
+@contextmanager
+def _asking() -> Iterator[Callable[..., Any]]:
+    """Give what asks a model: the keeper's, if there is a keeper, else one of this process."""
+    address = keeper_address()
+    if address is None:
+        yield residents.ask
+        return
+    client = KeeperClient(address)
+    try:
+        yield client.ask
+    finally:
+        client.close()

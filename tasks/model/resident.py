@@ -1,14 +1,85 @@
-"""Keep models loaded in this process: one a device, until another one is asked for."""
+"""Keep models loaded for this process: one a device, until another one is asked for."""
 
 from __future__ import annotations
 
+import atexit
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, Protocol
 
+from tasks.model.ask_worker import ask_worker
 from tasks.model.launch import Launch
+from tasks.model.worker import ModelWorker, Report
 from tasks.model_worker.calling import Predict, call, free_memory, out_of_memory_as
+
+
+class Loaded(Protocol):
+    """A model that can be asked, wherever it is; not ``alive`` any more after some errors."""
+
+    launch: Launch
+
+    @property
+    def alive(self) -> bool:
+        """Whether it can be asked again."""
+
+    def ask(self, request: Any, report: Report, stopped: Callable[[], bool]) -> Any:
+        """Return its answer."""
+
+    def close(self) -> None:
+        """Let go of it, and of its memory."""
+
+
+class LoadedHere:
+    """A model in this process."""
+
+    def __init__(self, launch: Launch) -> None:
+        self.launch = launch
+        self.alive = True
+        load = import_module(launch.module).load
+        with out_of_memory_as(launch.name, launch.device):
+            self._predict: Predict | None = load(launch.weights, launch.device)
+
+    def ask(self, request: Any, report: Report, stopped: Callable[[], bool]) -> Any:
+        """Return its answer."""
+        assert self._predict is not None
+        launch = self.launch
+        try:
+            return call(self._predict, request, launch.name, launch.device, launch.dtype)
+        except MemoryError:
+            free_memory()
+            raise
+
+    def close(self) -> None:
+        """Let go of it, and of its memory."""
+        self._predict, self.alive = None, False
+        free_memory()
+
+
+class LoadedElsewhere:
+    """A model in a worker process of this one."""
+
+    def __init__(self, launch: Launch) -> None:
+        self.launch = launch
+        self._worker = ModelWorker(launch)
+
+    @property
+    def alive(self) -> bool:
+        """Whether it can be asked again."""
+        return self._worker.alive
+
+    def ask(self, request: Any, report: Report, stopped: Callable[[], bool]) -> Any:
+        """Return its answer."""
+        return ask_worker(
+            lambda folder, digest: self._worker.ask(folder, digest, report, stopped),
+            self.launch,
+            request,
+        )
+
+    def close(self) -> None:
+        """End the worker."""
+        self._worker.close()
 
 
 @dataclass
@@ -16,8 +87,7 @@ class _Place:
     """What is loaded on a device; ``guard`` lets one call use it at a time."""
 
     guard: threading.RLock
-    launch: Launch | None = None
-    predict: Predict | None = None
+    loaded: Loaded | None = None
 
 
 class Residents:
@@ -28,17 +98,17 @@ class Residents:
         self._guard = threading.Lock()
         self.loads = 0
 
-    def call(self, launch: Launch, request: Any) -> Any:
+    def ask(self, launch: Launch, request: Any, report: Report, stopped: Callable[[], bool]) -> Any:
         """Return a model's answer; it is loaded first if it is not what the device holds.
 
-        Raises ModelOutOfMemory, and what the adapter raises.
+        Raises what ``ModelWorker.ask`` does, and what the adapter raises.
         """
         place = self._place(launch.device)
         with place.guard:
-            if place.launch != launch or place.predict is None:
-                self._load(place, launch)
-            assert place.predict is not None
-            return call(place.predict, request, launch.name, launch.device, launch.dtype)
+            loaded = place.loaded
+            if loaded is None or loaded.launch != launch or not loaded.alive:
+                loaded = self._load(place, launch)
+            return loaded.ask(request, report, stopped)
 
     def free(self) -> None:
         """Let go of all models."""
@@ -50,19 +120,19 @@ class Residents:
         with self._guard:
             return self._places.setdefault(device, _Place(threading.RLock()))
 
-    def _load(self, place: _Place, launch: Launch) -> None:
+    def _load(self, place: _Place, launch: Launch) -> Loaded:
         _clear(place)
-        load = import_module(launch.module).load
-        with out_of_memory_as(launch.name, launch.device):
-            place.predict = load(launch.weights, launch.device)
-        place.launch = launch
+        made: Loaded = LoadedHere(launch) if launch.python is None else LoadedElsewhere(launch)
         self.loads += 1
+        place.loaded = made
+        return made
 
 
 def _clear(place: _Place) -> None:
-    if place.predict is not None:
-        place.launch = place.predict = None
-        free_memory()
+    if place.loaded is not None:
+        loaded, place.loaded = place.loaded, None
+        loaded.close()
 
 
 residents = Residents()
+atexit.register(residents.free)

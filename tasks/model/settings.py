@@ -29,14 +29,15 @@ class ModelSettings:
     """How one model is run here.
 
     ``weights`` is the folder that holds its files. ``device`` is ``cpu``, ``cuda``, ``cuda:N``
-    or ``auto``: a GPU if there is one. With ``python``, the interpreter of another environment,
-    it runs in a worker process there. A call, loading included, that takes longer than
-    ``time_limit_s`` is stopped; so is one whose process holds more than ``memory_limit_gb``.
+    or ``auto``: a GPU if there is one. With ``python``, the interpreter of another environment
+    or the words that start one, it runs in a worker process there. A worker's call, loading
+    included, that takes longer than ``time_limit_s`` is stopped; so is one whose process holds
+    more than ``memory_limit_gb``.
     """
 
     weights: Path
     device: str = "auto"
-    python: Path | None = None
+    python: tuple[str, ...] | None = None
     time_limit_s: float = 1800.0
     memory_limit_gb: float | None = None
     dtype: Dtype = "float32"
@@ -119,10 +120,12 @@ def _typed(option: str, value: Any, name: str, file: Path) -> Any:
     known = [f.name for f in fields(ModelSettings)]
     if option not in known:
         raise BadInput(f"{where} is no option; there are {', '.join(known)}")
-    if option in ("weights", "python"):
+    if option == "weights":
         if not isinstance(value, str) or not value:
             raise BadInput(f"{where} must be a path")
         return file.parent / Path(value).expanduser()
+    if option == "python":
+        return _command(value, where, file)
     if option in ("time_limit_s", "memory_limit_gb"):
         if isinstance(value, bool) or not isinstance(value, int | float) or value <= 0:
             raise BadInput(f"{where} must be a positive number")
@@ -132,3 +135,12 @@ def _typed(option: str, value: Any, name: str, file: Path) -> Any:
     if not isinstance(value, str):
         raise BadInput(f"{where} must be a text")
     return value
+
+
+def _command(value: Any, where: str, file: Path) -> tuple[str, ...]:
+    """Return the words that start an interpreter; a name without a slash is looked for."""
+    if isinstance(value, str) and value:
+        return (str(file.parent / Path(value).expanduser()) if "/" in value else value,)
+    if isinstance(value, list) and value and all(isinstance(word, str) for word in value):
+        return tuple(value)
+    raise BadInput(f"{where} must be the path of a Python, or a list of words that start one")

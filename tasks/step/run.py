@@ -111,6 +111,12 @@ def current_run() -> RunContext:
         ) from None
 
 
+def is_stopped() -> bool:
+    """Tell whether the run that this code is part of was stopped; False outside of one."""
+    context = _current.get(None)
+    return context is not None and context.cancelled.is_set()
+
+
 @contextmanager
 def run_context(context: RunContext) -> Iterator[RunContext]:
     """Make ``context`` the run of all steps called inside.

@@ -32,7 +32,8 @@ def test_a_table_says_what_differs_and_its_paths_are_relative_to_the_file(models
     )
     settings = model_settings("doubler")
     folder = settings_file().parent
-    assert (settings.weights, settings.python) == (folder / "w/d", folder / "env/bin/python")
+    assert settings.weights == folder / "w/d"
+    assert settings.python == (str(folder / "env/bin/python"),)
     assert (settings.time_limit_s, settings.memory_limit_gb) == (90.0, 2.5)
     assert (settings.dtype, settings.device) == ("bfloat16", "cpu")
     assert model_settings("tripler").weights == models / "tripler"
@@ -49,6 +50,7 @@ def test_a_table_says_what_differs_and_its_paths_are_relative_to_the_file(models
         ('[doubler]\nmemory_limit_gb = "8"\n', "memory_limit_gb must be a positive number"),
         ("[doubler]\ntime_limit_s = true\n", "time_limit_s must be a positive number"),
         ("[doubler]\nweights = 3\n", "doubler.weights must be a path"),
+        ("[doubler]\npython = []\n", "doubler.python must be the path of a Python, or a list"),
         ('[doubler]\ndtype = "int4"\n', "dtype must be one of float32, bfloat16"),
         ('[doubler]\ndevice = "tpu"\n', "doubler runs on cpu or cuda, not on 'tpu'"),
         ('[tripler]\ndevice = "cuda:1"\n', "tripler runs on cpu, not on 'cuda:1'"),
