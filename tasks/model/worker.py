@@ -65,7 +65,7 @@ class ModelWorker:
         deadline = time.monotonic() + self.launch.time_limit_s
         try:
             if not self.loaded:
-                self._load_or_end(deadline, report, stopped)
+                self._load(deadline, report, stopped)
             self._asked += 1
             question = {"id": self._asked, "folder": str(folder), "digest": digest}
             self._say({protocol.ASK: question})
@@ -73,6 +73,13 @@ class ModelWorker:
             if said.get("id") != self._asked or not isinstance(said.get("digest"), str):
                 raise self._ended(f"answered another question than it was asked: {said}")
             return said
+        except _Told as told:
+            if not self.loaded:
+                self.close()
+            raise told.error from None
+        except BaseException:
+            self.close()
+            raise
         finally:
             self._pass_on_log()
 
@@ -88,13 +95,6 @@ class ModelWorker:
                     stdin.close()
             os.close(self._child.answers)
             self._child.output.unlink(missing_ok=True)
-
-    def _load_or_end(self, deadline: float, report: Report, stopped: Callable[[], bool]) -> None:
-        try:
-            self._load(deadline, report, stopped)
-        except Exception:
-            self.close()
-            raise
 
     def _load(self, deadline: float, report: Report, stopped: Callable[[], bool]) -> None:
         hello = self._expect(protocol.HELLO, deadline, report, stopped)
@@ -130,22 +130,29 @@ class ModelWorker:
         """Wait for one message, and pass on progress and the log until it comes."""
         while True:
             try:
-                for message in self._child.messages(_POLL_S):
-                    if protocol.PROGRESS in message:
-                        report(*_progress(message[protocol.PROGRESS]))
-                    elif protocol.ERROR in message:
-                        raise raised_in_worker(self.launch.name, message[protocol.ERROR])
-                    elif isinstance(message.get(word), dict):
-                        found: dict[str, Any] = message[word]
-                        return found
-                    else:
-                        raise Garbled(json.dumps(message)[:80])
+                found = self._heard(word, report)
             except (Garbled, TypeError, ValueError, KeyError) as error:
                 raise self._ended(f"does not keep to the protocol: it wrote {error}") from None
+            if found is not None:
+                return found
             self._pass_on_log()
             if self._child.silent:
                 raise self._ended(self._child.how_it_died(), subject="")
             self._check(deadline, stopped)
+
+    def _heard(self, word: str, report: Report) -> dict[str, Any] | None:
+        for message in self._child.messages(_POLL_S):
+            if protocol.PROGRESS in message:
+                share, doing = message[protocol.PROGRESS]
+                report(float(share), redact(str(doing)))
+            elif protocol.ERROR in message:
+                raise _Told(raised_in_worker(self.launch.name, message[protocol.ERROR]))
+            elif isinstance(message.get(word), dict):
+                found: dict[str, Any] = message[word]
+                return found
+            else:
+                raise Garbled(json.dumps(message)[:80])
+        return None
 
     def _check(self, deadline: float, stopped: Callable[[], bool]) -> None:
         if stopped():
@@ -183,6 +190,9 @@ class ModelWorker:
                 self._log.info("%s", redact(line.decode(errors="replace").rstrip()))
 
 
-def _progress(said: Any) -> tuple[float, str]:
-    share, doing = said
-    return float(share), redact(str(doing))
+class _Told(Exception):
+    """Carry an error that the worker told of, and survived."""
+
+    def __init__(self, error: Exception) -> None:
+        super().__init__(str(error))
+        self.error = error
