@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,6 +15,7 @@ from garden_models.scene import BadInput
 from storage.digest import digest_value
 from tasks.model.settings import ModelSettings, device_of, model_settings
 from tasks.model.weights import weights_of
+from tasks.model.worker_start import interpreter
 
 _LOOKING_S = 60
 _DIGITS = 15
@@ -69,7 +69,7 @@ def found_model(name: str) -> FoundModel:
         terms=card.terms_of(variant),
         digest=digest,
         device=device,
-        environment=str(settings.python or sys.executable),
+        environment=" ".join(interpreter(settings.python, settings.weights)),
         problems=tuple(problems),
     )
 
@@ -91,16 +91,17 @@ def _missing_code(card: ModelCard, settings: ModelSettings) -> tuple[str, ...]:
     if settings.python is None:
         missing = [module for module in card.imports if find_spec(module) is None]
     else:
+        words = interpreter(settings.python, settings.weights)
         try:
             looked = subprocess.run(
-                [str(settings.python), "-c", _FIND, *card.imports],
+                [*words, "-c", _FIND, *card.imports],
                 capture_output=True,
                 text=True,
                 timeout=_LOOKING_S,
                 check=True,
             )
         except (OSError, subprocess.SubprocessError) as error:
-            return (f"its environment {settings.python} does not run: {error}",)
+            return (f"its environment {' '.join(words)} does not run: {error}",)
         missing = looked.stdout.split()
     if not missing:
         return ()

@@ -61,18 +61,24 @@ def _start(launch: Launch, gpu: str | None) -> ChildProcess:
     return ChildProcess(process, answers, Path(log))
 
 
-def _command(launch: Launch) -> list[str]:
-    """Return the words that start a worker; a single one is a Python of this machine."""
-    folders = {name: _folder_of(name) for name in (*_OURS, launch.module.partition(".")[0])}
+def interpreter(python: tuple[str, ...] | None, weights: Path) -> list[str]:
+    """Return the words that start the settings' Python: our own if they name none.
+
+    ``{exchange}``, ``{weights}`` and ``{code}`` in them are the folders that it must see.
+    """
     values = {
         "exchange": str(exchange_root()),
-        "weights": str(launch.weights),
-        "code": folders["tasks"],
+        "weights": str(weights),
+        "code": _folder_of("tasks"),
     }
-    words = launch.python or (sys.executable,)
-    parent = str(os.getpid()) if len(words) == 1 else "0"
-    filled = [word.format_map(values) for word in words]
-    return [*filled, str(Path(start.__file__)), parent, json.dumps(folders)]
+    return [word.format_map(values) for word in python or (sys.executable,)]
+
+
+def _command(launch: Launch) -> list[str]:
+    folders = {name: _folder_of(name) for name in (*_OURS, launch.module.partition(".")[0])}
+    words = interpreter(launch.python, launch.weights)
+    parent = os.getpid() if len(words) == 1 else 0  # a wrapper, a container: not the parent
+    return [*words, str(Path(start.__file__)), str(parent), json.dumps(folders)]
 
 
 def _folder_of(package: str) -> str:

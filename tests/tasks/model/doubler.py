@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from garden_models.foundation.model_card import ModelCard, Terms, WeightFile
-from garden_models.scene import BadInput
+from tests.tasks.model.misbehave import HOW
 from tests.tasks.model.nouns import Answer, Ask, Part, Question
 
 CARD = ModelCard(
@@ -28,10 +28,9 @@ def load(weights: Path, device: str) -> Ask:
     factor = float((weights / "factor.txt").read_text())
 
     def ask(question: Question) -> Answer:
-        if question.how == "bad":
-            raise BadInput("the question is bad: ask another one")
-        if question.how == "memory":
-            raise MemoryError("no room for 3 more bytes")
+        if question.how in HOW:
+            wrong: Answer = HOW[question.how](question)
+            return wrong
         noise = random.random() + float(np.random.uniform())
         parts = (Part(np.eye(4), "upright"),) if len(question.values) else ()
         return Answer(question.values * factor, noise, parts)
