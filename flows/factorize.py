@@ -20,7 +20,7 @@ from tasks.register import register
 from tasks.render import render
 from tasks.segment import segment
 from tasks.simulate import simulate
-from tasks.step import Ref, StepFailed, fan_out
+from tasks.step import Postponed, Ref, StepFailed, fan_out
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,9 @@ def factorize_scene(
     refs.gravity_view = align_gravity(refs.reconstruction, preset.gravity)
     factor = partial(factor_object, refs=refs, preset=preset)
     outcomes = list(zip(targets, fan_out(factor, targets), strict=True))
+    for _, outcome in outcomes:
+        if isinstance(outcome, Postponed):
+            raise outcome
     refs.objects = tuple(o for _, o in outcomes if isinstance(o, FactoredObject))
     refs.failed_targets = tuple((t, o) for t, o in outcomes if isinstance(o, StepFailed))
     masks = tuple(o.masks for o in refs.objects)

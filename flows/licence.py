@@ -16,7 +16,12 @@ LICENCES: tuple[Licence, ...] = get_args(Licence)
 
 def models_of(preset: Preset) -> tuple[str, ...]:
     """Return the models that a preset's options name, in the order of its steps."""
-    return tuple(dict.fromkeys(name for name in _texts(preset) if name in ADAPTERS))
+    return models_in(preset)
+
+
+def models_in(options: Any) -> tuple[str, ...]:
+    """Return the models that any options name, in their order."""
+    return tuple(dict.fromkeys(name for name in _texts(options) if name in ADAPTERS))
 
 
 def check_licence(

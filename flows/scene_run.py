@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 from flows.factorize import SceneRefs, factorize_scene
+from flows.licence import models_of
 from flows.preset import Preset
 from flows.step_runner import AT_ONCE_ELSEWHERE, Elsewhere
 from garden_models.scene import Target
@@ -67,24 +69,40 @@ def run_scene(
     engine: Literal["prefect", "local"] = "prefect",
     budget: Budget | None = None,
     elsewhere: Elsewhere = None,
+    postponed: frozenset[str] = frozenset(),
 ) -> SceneResult:
     """Execute the scene's flow with Prefect (or ``local``, in this process without it).
 
     Steps start when the ``budget`` (of the whole machine if not given) has room for them;
-    ``elsewhere`` computes them on other machines (``flows.step_runner``).
+    ``elsewhere`` computes them on other machines (``flows.step_runner``). Before a step that is
+    ``postponed`` the scene stops, with Postponed as its failure. Models that it asks are
+    loaded once for all its steps.
 
     A scene that fails comes back with ``refs.failure`` set and all that was computed.
     """
     check_writable(request.package)
     budget = budget or Budget.of_machine()
-    if engine == "local":
-        return _run(request, _context(request, store, "local", events, budget, elsewhere))
-    from flows.prefect_flow import PrefectProgress, scene_flow
+    context = _context(request, store, engine, events, budget, elsewhere, postponed)
+    with _models_loaded_once(request, elsewhere):
+        if engine == "local":
+            return _run(request, context)
+        from flows.prefect_flow import PrefectProgress, scene_flow
 
-    progress = PrefectProgress(events)
-    context = _context(request, store, "prefect", progress, budget, elsewhere)
-    result: SceneResult = scene_flow(request.name)(_run)(request, context)
-    return result
+        context.events = PrefectProgress(events)
+        result: SceneResult = scene_flow(request.name)(_run)(request, context)
+        return result
+
+
+@contextmanager
+def _models_loaded_once(request: SceneRequest, elsewhere: Elsewhere) -> Iterator[None]:
+    """Have the scene's steps ask their models of one keeper, if they ask any on this machine."""
+    if elsewhere is not None or not models_of(request.preset):
+        yield
+        return
+    from tasks.model.keeper_process import is_wanted, model_keeper
+
+    with model_keeper() if is_wanted() else nullcontext():
+        yield
 
 
 def _context(
@@ -94,6 +112,7 @@ def _context(
     events: Callable[[StepEvent], None],
     budget: Budget,
     elsewhere: Elsewhere,
+    postponed: frozenset[str],
 ) -> RunContext:
     return RunContext(
         store=store,
@@ -104,6 +123,7 @@ def _context(
         workers=max(2, len(budget.cores)) if elsewhere is None else AT_ONCE_ELSEWHERE,
         budget=budget,
         elsewhere=elsewhere,
+        postponed=postponed,
     )
 
 

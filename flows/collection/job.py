@@ -23,6 +23,8 @@ class JobRun:
     engine: Literal["prefect", "local"]
     budget: Budget
     elsewhere: Elsewhere = None
+    postponed: frozenset[str] = frozenset()
+    """Steps before which the job stops, to be run again later."""
 
     def __call__(self, event: StepEvent) -> None:
         """Take one event, from any thread."""
@@ -36,16 +38,26 @@ class Job(Protocol):
         """Return the report if nothing has to run, from the store alone; else None."""
 
     def run(self, store: Store, events: JobRun) -> Report:
-        """Do the work; an error makes the scene one that failed, with its words."""
+        """Do the work; an error makes the scene one that failed, with its words.
+
+        A job that stopped before a step of ``events.postponed`` reports ``{"postponed": step}``.
+        """
 
 
 @dataclass(frozen=True)
 class JobOrder:
-    """How to make a job in any process: ``module:callable`` and its JSON arguments."""
+    """How to make a job in any process: ``module:callable`` and its JSON arguments.
+
+    ``models`` are those that it asks. ``stops`` are the steps, in the order in which a scene
+    comes to them, before which it lets other scenes catch up (``flows.collection.passes``).
+    """
 
     name: str
     job: str
     arguments: dict[str, Any] = field(default_factory=dict)
+    models: tuple[str, ...] = ()
+    stops: tuple[str, ...] = ()
+    postponed: tuple[str, ...] = ()
 
     def make(self) -> Job:
         """Return the job."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from typing import Any
 
 from flows.collection.row import ENDED, RunningStep, SceneRow, Status
 from flows.collection.state import CollectionState
@@ -86,6 +87,24 @@ def _step(step: RunningStep) -> str:
     if step.share:
         text += f" {100 * step.share:.0f} %"
     return text + (f" ({step.doing})" if step.doing else "")
+
+
+def model_lines(state: CollectionState) -> list[str]:
+    """Return one line on each model that the batch asked: how often it was loaded, and asked."""
+    return [f"{name}: {model_facts(cost)}" for name, cost in state.models.items()]
+
+
+def model_facts(cost: dict[str, Any]) -> str:
+    """Return what a model cost, in words."""
+    loads = f"loaded {_times(cost['loads'])} in {duration(cost['load_s'])}"
+    asked = f"asked {_times(cost['calls'])} in {duration(cost['run_s'])}"
+    failed = f", {_times(cost['failures'])} without an answer" if cost["failures"] else ""
+    gpu = f", {cost['peak_gpu_gb']:.1f} GB of a GPU" if cost["peak_gpu_gb"] else ""
+    return f"{loads}, {asked}{failed}; peak {cost['peak_gb']:.1f} GB{gpu}"
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
 
 
 def duration(seconds: float) -> str:

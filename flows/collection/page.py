@@ -7,7 +7,7 @@ from html import escape, unescape
 from importlib.resources import files
 from urllib.parse import quote
 
-from flows.collection.overview import counts, duration
+from flows.collection.overview import counts, duration, model_lines
 from flows.collection.row import WORST_FIRST, SceneRow
 from flows.collection.state import PAGE, CollectionState, write_beside
 from flows.collection.thumbnail import thumbnails
@@ -56,10 +56,11 @@ def _head(state: CollectionState) -> str:
     started = time.strftime("%Y-%m-%d %H:%M", time.localtime(state.started))
     lasted = duration(max(state.updated - state.started, 0.0))
     remarks = "".join(f'<p class="dim">{escape(remark)}</p>' for remark in state.remarks)
+    models = "".join(f'<p class="dim">{escape(line)}</p>' for line in model_lines(state))
     return (
         f"<h1>{escape(state.name)}</h1>"
         f'<p class="dim">Last batch: {escape(state.phase)}, started {started}, {lasted}. '
-        f'Worst scenes first.</p><div class="facts">{cells}</div>{remarks}'
+        f'Worst scenes first.</p><div class="facts">{cells}</div>{models}{remarks}'
     )
 
 

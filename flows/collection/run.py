@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+import heapq
 import os
 import select
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -15,6 +18,7 @@ from typing import Any, Literal
 from flows.collection.definition import Collection
 from flows.collection.job import JobOrder
 from flows.collection.page import write_page
+from flows.collection.passes import Priority, passes_made, postponed, priority
 from flows.collection.row import RunningStep, SceneRow, Status, worst_status
 from flows.collection.scene_job import scene_order
 from flows.collection.state import (
@@ -200,7 +204,11 @@ class _Runner:
         self._on_event = on_event
         self._store = Store.open(state.store)
         self._unplanned = deque(name for name in chosen if name in jobs)
-        self._ready: deque[str] = deque()
+        self._ready: list[tuple[Priority, str]] = []  # a heap
+        self._positions = {name: position for position, name in enumerate(chosen)}
+        self._passed: dict[str, int] = {}
+        self._earlier: dict[str, int] = {}  # steps executed in earlier passes
+        self._costs: Callable[[], dict[str, Any]] = dict
         self._workers: list[WorkerProcess] = []
         self._environment = dict(os.environ)
 
@@ -235,12 +243,32 @@ class _Runner:
         write_page(self._state)
 
     def _in_engine(self) -> None:
-        if self._options.engine == "local":
-            self._work()
-            return
-        from flows.collection.prefect_collection import in_collection_flow
+        with self._models_kept():
+            if self._options.engine == "local":
+                self._work()
+                return
+            from flows.collection.prefect_collection import in_collection_flow
 
-        in_collection_flow(self._state.name, self._work, self._environment)
+            in_collection_flow(self._state.name, self._work, self._environment)
+
+    @contextmanager
+    def _models_kept(self) -> Iterator[None]:
+        """Have all scenes ask their models of one keeper, if they ask any on this machine."""
+        asks = any(job.models for job in self._jobs.values())
+        if not asks or self._options.runner.name is not None:
+            yield
+            return
+        from tasks.model.keeper_process import is_wanted, kept_by, model_keeper
+
+        if not is_wanted():
+            yield
+            return
+        with model_keeper() as self._costs:
+            self._environment |= kept_by()
+            try:
+                yield
+            finally:
+                self._state.models = self._costs()
 
     def _plan_until_work(self) -> None:
         """Look for finished scenes; no server and no worker is started for these."""
@@ -271,7 +299,7 @@ class _Runner:
         except Exception as error:  # noqa: BLE001 - whatever it is, it is this scene's alone
             report = {"status": "failed", "reasons": [failure_reason(error)]}
         if report is None:
-            self._ready.append(row.name)
+            self._put_ready(row.name)
             self._tell("planned", row)
             return
         row.take(report)
@@ -288,7 +316,7 @@ class _Runner:
         """Give every free worker a scene; start workers as far as there are scenes."""
         for worker in [w for w in self._workers if w.job is None]:
             if self._ready:
-                self._start(self._ready.popleft(), worker)
+                self._start(self._next_ready(), worker)
         while self._ready and len(self._workers) < self._state.scenes_at_once:
             setting = WorkerSetting(
                 store=self._state.store,
@@ -301,13 +329,24 @@ class _Runner:
             )
             worker = WorkerProcess(setting, self._environment)
             self._workers.append(worker)
-            self._start(self._ready.popleft(), worker)
+            self._start(self._next_ready(), worker)
+
+    def _next_ready(self) -> str:
+        """Take the scene whose turn it is out of the queue."""
+        return heapq.heappop(self._ready)[1]
+
+    def _put_ready(self, name: str) -> None:
+        passed, stops = self._passed.get(name, 0), self._jobs[name].stops
+        heapq.heappush(self._ready, (priority(self._positions[name], passed, stops), name))
 
     def _start(self, name: str, worker: WorkerProcess) -> None:
-        worker.give(self._jobs[name])
-        self._state.rows[name] = self._fresh(name, "running")
-        self._state.rows[name].started = worker.started
-        self._tell("started", self._state.rows[name])
+        job, passed = self._jobs[name], self._passed.get(name, 0)
+        worker.give(dataclasses.replace(job, postponed=postponed(job.stops, passed)))
+        if passed == 0:
+            self._state.rows[name] = self._fresh(name, "running")
+        row = self._state.rows[name]
+        row.status, row.started = "running", worker.started
+        self._tell("started", row)
 
     def _fresh(self, name: str, status: Status) -> SceneRow:
         """Return a scene's row without what was known, but for the package that is there."""
@@ -334,7 +373,11 @@ class _Runner:
             return
         worker.finish_job()
         failed = {"status": "failed", "reasons": [message.get("failed")]}
-        self._finish(row, message.get("done", failed), worker)
+        report = message.get("done", failed)
+        if "postponed" in report:
+            self._put_back(row, report, worker)
+        else:
+            self._finish(row, report, worker)
         if worker.is_worn:
             self._workers.remove(worker)
             worker.end(GRACE_S)
@@ -347,11 +390,24 @@ class _Runner:
             self._finish(self._state.rows[worker.job], report, worker)
         worker.end()
 
+    def _put_back(self, row: SceneRow, report: dict[str, Any], worker: WorkerProcess) -> None:
+        """Queue a scene for its next pass."""
+        self._passed[row.name] = passes_made(self._jobs[row.name].stops, report)
+        self._earlier[row.name] = row.executed
+        row.seconds = round(row.seconds + time.time() - worker.started, 3)
+        row.status, row.running = "waiting", []
+        self._put_ready(row.name)
+        self._tell("progress", row)
+
     def _finish(self, row: SceneRow, report: dict[str, Any], worker: WorkerProcess) -> None:
+        earlier = self._earlier.pop(row.name, 0)
         row.take(report)
+        if "executed" in report and earlier:
+            row.executed, row.cached = row.executed + earlier, max(row.cached - earlier, 0)
         row.running = []
         row.finished = time.time()
-        row.seconds = round(row.finished - worker.started, 3)
+        row.seconds = round(row.seconds + row.finished - worker.started, 3)
+        self._state.models = self._costs()
         if row.status == "failed":
             self._state.save_failed()
         self._tell("finished", row)

@@ -9,11 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from flows.collection.job import JobOrder, JobRun, Report
+from flows.collection.passes import stops_of
+from flows.licence import models_of
 from flows.preset import Preset
 from flows.scene_run import SceneRequest, is_finished, plan_scene, run_scene
 from garden_models.scene import Target
 from storage import Store
 from tasks.ingest import CaptureSource
+from tasks.step import Postponed
 from tasks.step.wire import plain_from_json, plain_to_json
 
 _PLAIN: dict[str, Any] = {
@@ -43,8 +46,16 @@ class SceneJob:
         from flows.package.write import write_scene_package
 
         result = run_scene(
-            self.request, store, events, events.engine, events.budget, events.elsewhere
+            self.request,
+            store,
+            events,
+            events.engine,
+            events.budget,
+            events.elsewhere,
+            events.postponed,
         )
+        if isinstance(result.refs.failure, Postponed):
+            return {"postponed": result.refs.failure.step}
         return scene_report(write_scene_package(result, store), self.request.package)
 
 
@@ -54,7 +65,13 @@ def scene_order(request: SceneRequest) -> JobOrder:
         name: plain_to_json(getattr(request, name)) for name in ("name", *_PLAIN)
     }
     arguments |= {"package": str(request.package), "force": sorted(request.force)}
-    return JobOrder(request.name, "flows.collection.scene_job:scene_job", arguments)
+    return JobOrder(
+        request.name,
+        "flows.collection.scene_job:scene_job",
+        arguments,
+        models=models_of(request.preset),
+        stops=() if request.force else stops_of(request.preset),
+    )
 
 
 def scene_job(name: Any, package: str, force: list[str], **plain: Any) -> SceneJob:

@@ -46,6 +46,9 @@ class CollectionState:
     started: float = field(default_factory=time.time)
     updated: float = 0.0
     remarks: list[str] = field(default_factory=list)
+    models: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """What each model cost so far (``tasks.model.tally.Cost``)."""
+
     before: dict[str, SceneRow] = field(default_factory=dict)
     """What the last batch left of these scenes; it holds until they are looked at again."""
 
@@ -101,6 +104,7 @@ class CollectionState:
             "started": self.started,
             "updated": self.updated,
             "remarks": self.remarks,
+            "models": self.models,
             "scenes": [row.to_json() for row in self.rows.values()],
         }
 
@@ -133,6 +137,7 @@ def read_state(out: Path) -> CollectionState | None:
         started=document["started"],
         updated=document["updated"],
         remarks=document["remarks"],
+        models=document.get("models", {}),
     )
     if state.phase == "running" and (owner is None or owner.is_dead()):
         state.phase = "stopped (killed)"

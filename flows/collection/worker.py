@@ -70,9 +70,11 @@ class _Work:
 
         engine: Any = self._setting.engine
         try:
-            job = JobOrder(**order).make()
+            known = JobOrder(**order)
+            job = known.make()
+            postponed = frozenset(known.postponed)
             with _tagged(self._setting):
-                events = JobRun(self._tell, engine, self._budget, self._elsewhere)
+                events = JobRun(self._tell, engine, self._budget, self._elsewhere, postponed)
                 report = job.run(self._store, events)
         except Exception as error:  # noqa: BLE001 - whatever it is, it is this scene's alone
             return {"failed": failure_reason(error)}

@@ -9,6 +9,7 @@ from typing import Any
 
 from flows.collection.overview import (
     counts,
+    model_lines,
     running_line,
     scene_line,
     seconds_left,
@@ -97,7 +98,7 @@ def _lines(state: CollectionState) -> list[str]:
         lines.append(
             f"process {state.owner.pid} on {state.owner.host}, last heard of {age:.0f} s ago"
         )
-    return [*lines, summary(state)]
+    return [*lines, *model_lines(state), summary(state)]
 
 
 def _watch(out: Path) -> None:

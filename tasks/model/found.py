@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -14,6 +13,7 @@ from garden_models.foundation.model_card import ModelCard, Terms
 from garden_models.scene import BadInput
 from storage.digest import digest_value
 from tasks.model.settings import ModelSettings, device_of, model_settings
+from tasks.model.variant import variant_of
 from tasks.model.weights import weights_of
 from tasks.model.worker_start import interpreter
 
@@ -72,18 +72,6 @@ def found_model(name: str) -> FoundModel:
         environment=" ".join(interpreter(settings.python, settings.weights)),
         problems=tuple(problems),
     )
-
-
-def variant_of(card: ModelCard, weights: Path) -> str | None:
-    """Return which variant a weight folder holds, None if it does not say."""
-    if not card.variant_key:
-        return None
-    try:
-        document = json.loads((weights / "config.json").read_text("utf-8"))
-    except (OSError, ValueError):
-        return None
-    value = document.get(card.variant_key) if isinstance(document, dict) else None
-    return value if isinstance(value, str) else None
 
 
 def _missing_code(card: ModelCard, settings: ModelSettings) -> tuple[str, ...]:

@@ -21,13 +21,17 @@ from tasks.model_worker import protocol
 from tasks.step.ref import Cancelled
 
 VARIABLE = "GARDEN_KEEPER"
+OFF = "off"
 _POLL_S = 0.1
 
 
 def keeper_address() -> Path | None:
-    """Return the keeper's socket, None if models run in this process."""
+    """Return the keeper's socket, None if models run in this process.
+
+    ``$GARDEN_KEEPER`` names it; ``off`` wants none.
+    """
     given = os.environ.get(VARIABLE)
-    return Path(given) if given else None
+    return Path(given) if given and given != OFF else None
 
 
 class KeeperClient:

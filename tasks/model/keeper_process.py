@@ -21,6 +21,16 @@ Costs = Callable[[], dict[str, dict[str, Any]]]
 """Returns what each model cost so far (``tally.Cost`` as JSON)."""
 
 
+def kept_by() -> dict[str, str]:
+    """Return the environment variable that tells a process of the keeper."""
+    return {VARIABLE: os.environ[VARIABLE]}
+
+
+def is_wanted() -> bool:
+    """Tell whether a keeper may be started: there is none yet, and nobody said ``off``."""
+    return not os.environ.get(VARIABLE)
+
+
 @contextmanager
 def model_keeper() -> Iterator[Costs]:
     """Have all processes that are started inside ask their models of one keeper.

@@ -17,6 +17,7 @@ from garden_models.scene import BadInput
 from storage.digest import digest_file
 from storage.user_folders import cache_folder
 from tasks.model.settings import model_settings
+from tasks.model.variant import variant_of
 from tasks.step.code import code_of
 
 _FRESH_NS = 2_000_000_000
@@ -49,20 +50,22 @@ def weights_of(name: str) -> dict[str, str]:
     """Return what identifies a model: digests of its weight files and of its adapter's code.
 
     For ``weights=`` of a step that calls it: the code is not seen by the step's own digest.
-    Raises BadInput as ``weight_files`` does.
+    A precision other than float32 is among it too. Raises BadInput as ``weight_files`` does.
     """
     known = _read()
     digests = {place: _digest(path, known) for place, path in weight_files(name).items()}
-    return digests | {"adapter": code_of(foundation.ADAPTERS[name]).digest[:_CODE_DIGITS]}
+    digests["adapter"] = code_of(foundation.ADAPTERS[name]).digest[:_CODE_DIGITS]
+    dtype = model_settings(name).dtype
+    return digests if dtype == "float32" else digests | {"dtype": dtype}
 
 
 def backend_of(name: str) -> str:
-    """Return a model's name, with its precision if that is not the usual one.
+    """Return a model's name, with its variant (``name/variant``) if its weights say it.
 
     For ``backend=`` of a step that calls it.
     """
-    dtype = model_settings(name).dtype
-    return name if dtype == "float32" else f"{name} {dtype}"
+    variant = variant_of(foundation.card(name), model_settings(name).weights)
+    return name if variant is None else f"{name}/{variant}"
 
 
 def stamp_of(name: str) -> str:

@@ -13,7 +13,7 @@ from typing import Any, Literal, TypeVar
 from storage.digest import digest_file
 from tasks.step.budget import ONE_CORE, Need
 from tasks.step.code import Code, code_of
-from tasks.step.execute import Call, execute, plan
+from tasks.step.execute import Call, check_postponed, execute, plan
 from tasks.step.inputs import Arguments, bind, futures_in, label_of, resolve, split
 from tasks.step.key import KeyParts, without
 from tasks.step.ref import (
@@ -131,7 +131,9 @@ class Step:
     def _call(self, context: RunContext, bound: dict[str, Any], label: str | None) -> Call:
         values = {name: resolve(value) for name, value in bound.items()}
         given = label if label is not None else label_of(values)
-        return Call(context, self, split(values, lambda noun: _given(context, noun)), given)
+        call = Call(context, self, split(values, lambda noun: _given(context, noun)), given)
+        check_postponed(call)
+        return call
 
 
 def _given(context: RunContext, noun: object) -> Ref:

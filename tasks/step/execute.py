@@ -26,6 +26,7 @@ from tasks.step.ref import (
     Outcome,
     PlanAction,
     PlanEntry,
+    Postponed,
     Ref,
     Seconds,
     StepCrashed,
@@ -114,6 +115,19 @@ def _planned(call: Call, record: ActionRecord | None, why: Why, key: str) -> Ref
     action: PlanAction = "would run" if record is None else "cached"
     call.context.add_plan(PlanEntry(call.step.name, call.label, action, why, ref))
     return ref
+
+
+def check_postponed(call: Call) -> None:
+    """Raise Postponed for a call that has to run and is left to a later run."""
+    context, step = call.context, call.step
+    if step.name not in context.postponed or context.engine == "plan":
+        return
+    try:
+        parts = step.key_parts(call.arguments)
+    except Exception:  # noqa: BLE001 - whatever it is, the run of the step tells it
+        return
+    if context.is_forced(step.name, call.name) or context.store.lookup(parts.key)[0] is None:
+        raise Postponed(step.name, call.label)
 
 
 def execute(call: Call, lost: str = "") -> Ref:

@@ -153,6 +153,16 @@ def _rebuild(step: str, label: str, reason: str, kind: str, retryable: bool) -> 
     return StepFailed(step, label, reason, kind=kind, retryable=retryable)
 
 
+class Postponed(StepFailed):
+    """A step that has to run was left to a later run (``RunContext.postponed``)."""
+
+    def __init__(self, step: str, label: str) -> None:
+        super().__init__(step, label, "it is left to a later run", kind="Postponed")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Postponed, (self.step, self.label)
+
+
 class PendingValue(RuntimeError):
     """A plan asked for a value that only a run can give."""
 

@@ -37,7 +37,8 @@ class RunContext:
     even on a hit. ``workers`` bounds the steps that the local engine runs at once.
     ``isolate=False`` runs isolated steps in this process (for tests). Without ``budget``
     steps wait for nobody. ``elsewhere`` computes calls that are not in the store on other
-    machines (``tasks.step.dask_runner``). ``outcomes`` and ``plan`` are filled as steps finish.
+    machines (``tasks.step.dask_runner``). ``postponed`` names steps that are not run here: a call
+    that is not in the store raises Postponed. ``outcomes`` and ``plan`` are filled as steps finish.
     """
 
     store: Store
@@ -53,6 +54,7 @@ class RunContext:
     plan: list[PlanEntry] = field(default_factory=list)
     cancelled: threading.Event = field(default_factory=threading.Event)
     elsewhere: Callable[[Any], Ref] | None = None
+    postponed: frozenset[str] = frozenset()
     producers: dict[str, Callable[[str], Ref]] = field(default_factory=dict)
     _guard: threading.RLock = field(default_factory=threading.RLock)
     _pin: str = ""

@@ -171,7 +171,7 @@ def test_a_keeper_of_another_version_is_refused(
 
     monkeypatch.setattr(protocol, "VERSION", "garden.worker/99")
     with (
-        pytest.raises(ModelFailed, match="keeper speaks garden.worker/1, and this GARDEN garden"),
+        pytest.raises(ModelFailed, match=r"keeper speaks garden\.worker/1, and this GARDEN garden"),
         predictor("doubler"),
     ):
         raise AssertionError
@@ -180,7 +180,7 @@ def test_a_keeper_of_another_version_is_refused(
 def test_a_keeper_that_is_gone_is_told(models: Path, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setenv("GARDEN_KEEPER", str(tmp_path / "no.sock"))
     with (
-        pytest.raises(ModelFailed, match="the models' keeper is gone .*: start the run again"),
+        pytest.raises(ModelFailed, match=r"the models' keeper is gone .*: start the run again"),
         predictor("doubler"),
     ):
         raise AssertionError

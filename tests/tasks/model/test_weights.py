@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from garden_models.scene import BadInput
 from tasks.model import backend_of, weights, weights_of
 from tasks.model.settings import settings_file
 from tasks.model.weights import stamp_of, weight_files
+from tests.tasks.model import doubler
 
 
 @pytest.fixture
@@ -97,8 +99,20 @@ def test_the_adapters_code_counts(models: Path, monkeypatch: pytest.MonkeyPatch)
     assert weights_of("doubler") != first
 
 
-def test_the_precision_is_part_of_the_backends_name(models: Path) -> None:
-    assert backend_of("doubler") == "doubler"
+def test_the_precision_counts(models: Path) -> None:
+    first = weights_of("doubler")
     settings_file().parent.mkdir(parents=True)
     settings_file().write_text('[doubler]\ndtype = "bfloat16"')
-    assert backend_of("doubler") == "doubler bfloat16"
+    assert weights_of("doubler") == first | {"dtype": "bfloat16"}
+
+
+def test_the_variant_is_part_of_the_backends_name(
+    models: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert backend_of("doubler") == "doubler"
+    monkeypatch.setattr(
+        doubler, "CARD", dataclasses.replace(doubler.CARD, variant_key="model_name")
+    )
+    assert backend_of("doubler") == "doubler"
+    (models / "doubler/config.json").write_text('{"model_name": "giant"}')
+    assert backend_of("doubler") == "doubler/giant"
