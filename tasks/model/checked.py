@@ -11,6 +11,7 @@ import jaxtyping
 import numpy as np
 
 from garden_models.foundation.failure import ModelFailed
+from storage.canonical import plain_scalar
 from storage.codec.tree import field_hints
 
 
@@ -52,6 +53,7 @@ def _wrong_fields(noun: Any, where: str) -> Iterator[str]:
 
 
 def _wrong(value: Any, hint: Any, where: str) -> Iterator[str]:
+    value = plain_scalar(value)
     if isinstance(value, np.ndarray):
         yield from _wrong_array(value, hint, where)
     elif dataclasses.is_dataclass(value) and not isinstance(value, type):
@@ -82,16 +84,29 @@ def _wrong_array(value: np.ndarray, hint: Any, where: str) -> Iterator[str]:
 
 def _array_hints(hint: Any) -> Iterator[Any]:
     """Give the array types that a hint such as ``tuple[Float[ndarray, "n"], ...] | None`` has."""
-    if isinstance(hint, type) and issubclass(hint, jaxtyping.AbstractArray):
-        yield hint
-    for argument in typing.get_args(hint):
-        yield from _array_hints(argument)
+    for leaf in _leaves(hint):
+        if isinstance(leaf, type) and issubclass(leaf, jaxtyping.AbstractArray):
+            yield leaf
 
 
 def _is_plain(value: Any, hint: Any) -> bool:
     """Tell whether something that is no array may stand where the hint stands."""
+    types = set(_leaves(hint))
     if value is None:
-        return type(None) in typing.get_args(hint) or hint is type(None)
-    if isinstance(hint, type) and issubclass(hint, jaxtyping.AbstractArray):
+        return type(None) in types
+    if not isinstance(value, str | bytes | bool | int | float):
         return False
-    return isinstance(value, str | bytes | bool | int | float)
+    return bool(types & {str, bytes, bool, int, float}) or not any(map(_is_array_type, types))
+
+
+def _leaves(hint: Any) -> Iterator[Any]:
+    """Give the types that a hint is made of."""
+    if _is_array_type(hint) or not typing.get_args(hint):
+        yield hint
+        return
+    for argument in typing.get_args(hint):
+        yield from _leaves(argument)
+
+
+def _is_array_type(hint: Any) -> bool:
+    return isinstance(hint, type) and issubclass(hint, jaxtyping.AbstractArray | np.ndarray)

@@ -13,11 +13,11 @@ import torch
 
 from garden_models.foundation.failure import ModelOutOfMemory
 from garden_models.scene import BadInput
-from tasks.model import predictor, resident
-from tasks.model.resident import residents
+from tasks.model import predictor
+from tasks.model.resident import LoadedHere, residents
 from tasks.model_worker.calling import call
 from tests.tasks.model.doubler import loads, put_weights
-from tests.tasks.model.nouns import Answer, Part, Question
+from tests.tasks.model.nouns import Answer, Ask, Part, Question
 
 QUESTION = Question(np.ones((3, 2)))
 
@@ -42,7 +42,10 @@ def test_another_model_takes_its_place_on_the_device(models: Path) -> None:
     with predictor("doubler") as double:
         double(QUESTION)
         place = residents._places["cpu"]
-        gone = weakref.ref(place.predict)  # type: ignore[arg-type]
+        loaded = place.loaded
+        assert isinstance(loaded, LoadedHere)
+        gone = weakref.ref(loaded._predict)  # type: ignore[arg-type]
+        del loaded
         with predictor("tripler") as triple:
             assert triple(QUESTION).values[0, 0] == 3.0
             gc.collect()
@@ -96,7 +99,7 @@ def test_every_kind_of_full_memory_is_one_error(error: Exception) -> None:
 def test_a_model_that_does_not_fit_leaves_nothing_behind(
     models: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def load(_weights: Path, _device: str) -> None:
+    def load(_weights: Path, _device: str) -> Ask:
         raise MemoryError
 
     with predictor("doubler") as predict:
@@ -104,6 +107,5 @@ def test_a_model_that_does_not_fit_leaves_nothing_behind(
         monkeypatch.setattr("tests.tasks.model.tripler.load", load)
         with predictor("tripler") as triple, pytest.raises(ModelOutOfMemory, match="tripler"):
             triple(QUESTION)
-        assert residents._places["cpu"].predict is None
+        assert residents._places["cpu"].loaded is None
         assert predict(QUESTION).values[0, 0] == 2.0
-    assert resident.residents is residents
