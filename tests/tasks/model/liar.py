@@ -25,7 +25,10 @@ def hear() -> Any:
 def answer(folder: Path, how: str) -> str:
     """Write an answer of which something is wrong; return the digest that is told."""
     folder.mkdir()
-    data = b"\x93NUMPY\x01\x00"
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (3, 2), }".ljust(117) + b"\n"
+    data = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + bytes(48)
+    if how == "no array":
+        data = data[:9]
     (folder / "0000.npy").write_bytes(data)
     digest = hashlib.sha256(data).hexdigest()
     members: dict[str, Any] = {"0000.npy": [len(data), digest]}
