@@ -26,8 +26,6 @@ from tasks.model_worker import protocol
 from tasks.parent_process import Answers, die_with
 from tasks.step.budget import Budget
 
-STATUS = "status"
-
 
 def main() -> None:
     """Serve until the parent ends."""
@@ -98,8 +96,8 @@ class _Attendant:
 
     def _obey(self, message: dict[str, Any]) -> None:
         try:
-            if STATUS in message:
-                self._answers.send({STATUS: self._desk.tally.to_json()})
+            if protocol.STATUS in message:
+                self._answers.send({protocol.STATUS: self._desk.tally.to_json()})
             else:
                 self._ask(message[protocol.ASK])
         except OSError:

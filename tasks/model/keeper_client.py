@@ -13,7 +13,6 @@ from typing import Any
 
 from garden_models.foundation.failure import ModelFailed
 from tasks.model.ask_worker import ask_worker
-from tasks.model.keeper import STATUS
 from tasks.model.launch import Launch, launch_to_json
 from tasks.model.worker import Report
 from tasks.model.worker_error import raised_in_worker
@@ -71,8 +70,8 @@ class KeeperClient:
 
     def status(self) -> dict[str, dict[str, Any]]:
         """Return what each model cost so far (``tally.Cost``)."""
-        self._send({STATUS: True})
-        return self._expect(STATUS, "the models' keeper", lambda _s, _d: None)
+        self._send({protocol.STATUS: True})
+        return self._expect(protocol.STATUS, "the models' keeper", lambda _s, _d: None)
 
     def close(self) -> None:
         """Hang up: the keeper counts on no more questions from here."""

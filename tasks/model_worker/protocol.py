@@ -7,6 +7,8 @@ VERSION = "garden.worker/1"
 
 HELLO, LOAD, ASK = "hello", "load", "ask"
 LOADED, PROGRESS, ANSWER, ERROR = "loaded", "progress", "answer", "error"
+STATUS = "status"
+"""What only the keeper is asked: what each model cost so far."""
 
 REQUEST_FOLDER, ANSWER_FOLDER = "request", "answer"
 """Of an exchange folder: what is asked, and where the answer is written."""
