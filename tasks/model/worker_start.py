@@ -37,7 +37,7 @@ def start_worker(launch: Launch, gpu: str | None) -> ChildProcess:
 
 
 def _start(launch: Launch, gpu: str | None) -> ChildProcess:
-    command = _command(launch)
+    command = worker_command(launch)
     descriptor, log = tempfile.mkstemp(prefix="garden-model-", suffix=".log")
     with os.fdopen(descriptor, "wb") as printed:
         try:
@@ -47,7 +47,7 @@ def _start(launch: Launch, gpu: str | None) -> ChildProcess:
                 stdout=subprocess.PIPE,
                 stderr=printed,
                 start_new_session=True,
-                env=_environment(gpu),
+                env=worker_environment(gpu),
             )
         except OSError as error:
             Path(log).unlink()
@@ -74,11 +74,12 @@ def interpreter(python: tuple[str, ...] | None, weights: Path) -> list[str]:
     return [word.format_map(values) for word in python or (sys.executable,)]
 
 
-def _command(launch: Launch) -> list[str]:
+def worker_command(launch: Launch, *more: str) -> list[str]:
+    """Return the words that start a worker; ``more`` are those of ``start``'s that follow."""
     folders = {name: _folder_of(name) for name in (*_OURS, launch.module.partition(".")[0])}
     words = interpreter(launch.python, launch.weights)
     parent = os.getpid() if len(words) == 1 else 0  # a wrapper, a container: not the parent
-    return [*words, str(Path(start.__file__)), str(parent), json.dumps(folders)]
+    return [*words, str(Path(start.__file__)), str(parent), json.dumps(folders), *more]
 
 
 def _folder_of(package: str) -> str:
@@ -89,7 +90,8 @@ def _folder_of(package: str) -> str:
     return str(Path(next(iter(spec.submodule_search_locations))).parent)
 
 
-def _environment(gpu: str | None) -> dict[str, str]:
+def worker_environment(gpu: str | None = None) -> dict[str, str]:
+    """Return what a worker's process is told, ``gpu`` being the only one that it sees if given."""
     environment = without_secret_variables(os.environ) | _OFFLINE
     for name in _NOT_THEIRS:
         environment.pop(name, None)

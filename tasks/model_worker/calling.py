@@ -27,7 +27,7 @@ def call(predict: Predict, request: Any, name: str, device: str, dtype: Dtype) -
         ModelOutOfMemory: it needs more memory than the device has.
     """
     seed = int(getattr(request, "seed", 0))
-    with _seeded(seed), _torch_mode(device, dtype), out_of_memory_as(name, device):
+    with _seeded(seed), torch_mode(device, dtype), out_of_memory_as(name, device):
         return predict(request)
 
 
@@ -99,7 +99,8 @@ def _started_gpus(torch: Any) -> list[int]:
 
 
 @contextmanager
-def _torch_mode(device: str, dtype: Dtype) -> Iterator[None]:
+def torch_mode(device: str, dtype: Dtype) -> Iterator[None]:
+    """Keep no gradients, and run at the precision asked for."""
     torch = sys.modules.get("torch")
     if torch is None:
         yield

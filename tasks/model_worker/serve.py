@@ -29,11 +29,12 @@ from tasks.model_worker.payload import read_payload, write_payload
 from tasks.parent_process import Answers, die_with
 
 
-def serve(parent: int) -> None:
+def main() -> None:
     """Speak the protocol on standard input and output; what libraries print goes to the log.
 
-    ``parent`` is the process to die with; 0 if it cannot be seen from here (a container).
+    The first word is the process to die with; 0 if it cannot be seen from here (a container).
     """
+    parent = int(sys.argv[1])
     if parent:
         die_with(parent)
     answers = Answers(os.dup(1))
@@ -84,7 +85,7 @@ class _Served:
         with out_of_memory_as(load["name"], load["device"]):
             self._predict = adapter.load(Path(load["weights"]), load["device"])
         self._load = load
-        return {"seconds": time.monotonic() - started, **_peaks()}
+        return {"seconds": time.monotonic() - started, **peaks()}
 
     def _do_ask(self, ask: dict[str, Any]) -> dict[str, Any]:
         if self._predict is None:
@@ -98,10 +99,11 @@ class _Served:
         answer = call(self._predict, request, name, device, dtype)
         digest = write_payload(answer, folder / protocol.ANSWER_FOLDER)
         seconds = time.monotonic() - started
-        return {"id": ask["id"], "digest": digest, "seconds": seconds, **_peaks()}
+        return {"id": ask["id"], "digest": digest, "seconds": seconds, **peaks()}
 
 
-def _peaks() -> dict[str, float]:
+def peaks() -> dict[str, float]:
+    """Return the most memory of this process so far, and of a GPU since the last call, in GB."""
     resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     kilobyte = 1 if sys.platform == "darwin" else 1024
     return {"peak_gb": resident * kilobyte / 1e9, "peak_gpu_gb": peak_gpu_gb()}

@@ -1,9 +1,11 @@
 """Start a worker with any Python: ``PYTHON start.py PARENT '{"garden_models": FOLDER, ...}'``.
 
-Only the packages that are named are found outside of that Python's own environment, so that
-nothing that lies beside them gets in.
+A third word names another module whose ``main`` is called in place of the worker's. Only the
+packages that are named are found outside of that Python's own environment, so that nothing
+that lies beside them gets in.
 """
 
+import importlib
 import json
 import os
 import sys
@@ -33,9 +35,8 @@ def main():  # type: ignore[no-untyped-def]
     here = os.path.dirname(os.path.abspath(__file__))  # noqa: PTH100, PTH120
     sys.path[:] = [folder for folder in sys.path if os.path.abspath(folder) != here]  # noqa: PTH100
     sys.meta_path.insert(0, NamedPackages(json.loads(sys.argv[2])))
-    from tasks.model_worker.serve import serve
-
-    serve(int(sys.argv[1]))
+    module = sys.argv[3] if len(sys.argv) > 3 else "tasks.model_worker.serve"
+    importlib.import_module(module).main()
 
 
 if __name__ == "__main__":

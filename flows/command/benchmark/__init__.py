@@ -23,6 +23,10 @@ BENCHMARKS = {
         "flows.command.benchmark.classifier",
         "the point classifier beside box, distance, connectivity",
     ),
+    "models": (
+        "flows.command.benchmark.models",
+        "what models cost to load and to run, by number of photos, beside a bare loop",
+    ),
     "latency": (
         "flows.command.benchmark.latency",
         "cold, cached and warm seconds a scene, object and step, beside the paper's table",
