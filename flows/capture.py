@@ -23,7 +23,8 @@ class FoundCapture:
     """A capture as found on disk, hashed but not decoded.
 
     ``sizes`` are the photos' (width, height), empty for a video, whose frames are not
-    known yet. ``unused_cameras`` lie beside the photos but were not asked for.
+    known yet. ``unused_cameras`` lie beside the photos but were not asked for, nor were
+    ``unused_targets``.
     """
 
     name: str
@@ -31,6 +32,7 @@ class FoundCapture:
     sizes: dict[str, tuple[int, int]]
     targets_file: Path | None
     unused_cameras: Path | None
+    unused_targets: Path | None = None
 
 
 def find_capture(path: Path, cameras: Path | None) -> FoundCapture:

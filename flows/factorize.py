@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from flows.preset import Preset
+from flows.target_proposal import look_for_targets, targets_of
 from garden_models.scene import Rivals, Target
 from tasks.align_gravity import align_gravity
 from tasks.clean_background import clean_background
@@ -41,6 +42,7 @@ class SceneRefs:
     targets: tuple[Target, ...]
     capture: Ref | None = None
     cameras: Ref | None = None
+    proposal: Ref | None = None
     reconstruction: Ref | None = None
     gravity_view: Ref | None = None
     objects: tuple[FactoredObject, ...] = ()
@@ -57,15 +59,20 @@ def factorize_scene(
 ) -> SceneRefs:
     """Turn a capture into a settled scene; return (and fill) the references.
 
-    A failed target leaves the others alone; a failed registration ends the scene.
-    Raises StepFailed.
+    Without targets those are taken that the preset's model proposes, while the photos are
+    reconstructed. A failed target leaves the others alone; a failed registration or proposal
+    ends the scene. Raises StepFailed.
     """
     refs.capture = ingest(source, preset.ingest)
     refs.cameras = register(refs.capture, preset.register)
     if refs.cameras.failed:
         raise StepFailed("register", "", "; ".join(refs.cameras.reasons), kind="BadGeometry")
+    looking = None if targets else look_for_targets(refs.capture, refs.cameras, preset)
     refs.reconstruction = reconstruct(refs.capture, refs.cameras, preset.reconstruct)
     refs.gravity_view = align_gravity(refs.reconstruction, preset.gravity)
+    if looking is not None:
+        refs.proposal = looking.result()
+        targets, refs.targets = targets_of(refs.proposal)
     factor = partial(factor_object, refs=refs, preset=preset)
     outcomes = list(zip(targets, fan_out(factor, targets), strict=True))
     for _, outcome in outcomes:
@@ -96,7 +103,7 @@ def factorize_scene(
         refs.background,
         refs.scene,
         refs.trajectory,
-        tuple(dict.fromkeys(t.photo for t in targets)),
+        tuple(dict.fromkeys(t.photo for t in refs.targets)),
         preset.render,
     )
     return refs

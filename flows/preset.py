@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from garden_models.scene import BadInput
+from garden_models.targets.config import GroundTargets, ProposeTargets
 from tasks.align_gravity import AlignGravity
 from tasks.clean_background import CleanBackground
 from tasks.compose import Compose
@@ -31,6 +32,8 @@ class Preset:
 
     ingest: Ingest = field(default_factory=Ingest)
     register: Registration = field(default_factory=Registration)
+    propose: ProposeTargets = field(default_factory=ProposeTargets)
+    ground: GroundTargets = field(default_factory=GroundTargets)
     reconstruct: DenseStereo = field(default_factory=DenseStereo)
     gravity: AlignGravity = field(default_factory=AlignGravity)
     segment: Segment = field(default_factory=Segment)

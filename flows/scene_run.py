@@ -145,10 +145,9 @@ def package_key(result: SceneResult) -> str:
         for o in refs.objects
     ]
     failed = [[target.name, failure.reason] for target, failure in refs.failed_targets]
-    return digest_value(
-        (PACKAGE_VERSION, result.request.name, contents, objects, failed, result.request.remarks),
-        domain="garden.package/1",
-    )
+    made_from = PACKAGE_VERSION, result.request.name, contents, objects, failed
+    proposal = () if refs.proposal is None else (refs.proposal.content,)
+    return digest_value((*made_from, result.request.remarks, *proposal), domain="garden.package/1")
 
 
 def _as_event(entry: PlanEntry, scene: str) -> StepEvent:

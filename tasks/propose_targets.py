@@ -13,7 +13,6 @@ from collections.abc import Callable
 from garden_models.progress import Progress, silent
 from garden_models.scene import Capture
 from garden_models.targets.config import ProposeTargets, api_of, boxes_of
-from garden_models.targets.prompts import PROMPTS_VERSION
 from garden_models.targets.proposal import TargetProposal
 from garden_models.targets.vlm_model import AskVlm
 from tasks.step import StepFailed, step
@@ -26,6 +25,8 @@ _SKIP = tuple(
 
 def _backend(config: ProposeTargets, **_others: object) -> str:
     """Name the model and how it is asked."""
+    from garden_models.targets.prompts import PROMPTS_VERSION
+
     return f"{config.model} ({api_of(config)}, {boxes_of(config)}, prompts {PROMPTS_VERSION})"
 
 

@@ -7,7 +7,9 @@ from collections.abc import Iterator
 
 import pytest
 
+from garden_models.targets.config import ProposeTargets
 from tests.s3_server import S3Server, s3_server
+from tests.vlm_server import KEY, KEY_VARIABLE, MODEL, VlmServer, vlm_server
 
 
 @pytest.fixture(scope="session")
@@ -39,3 +41,22 @@ def s3(s3_process: S3Server, monkeypatch: pytest.MonkeyPatch) -> S3Server:
     s3_process.fail(0)
     s3_process.counted()
     return s3_process
+
+
+@pytest.fixture
+def vlm(monkeypatch: pytest.MonkeyPatch) -> Iterator[VlmServer]:
+    """Give a vision-language model's server on loopback, with its key in the environment."""
+    for name in ("GEMINI_API_KEY", "GOOGLE_API_KEY", "OPENAI_API_KEY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("NO_PROXY", "127.0.0.1")
+    monkeypatch.setenv(KEY_VARIABLE, KEY)
+    with vlm_server() as running:
+        yield running
+
+
+@pytest.fixture
+def vlm_config(vlm: VlmServer) -> ProposeTargets:
+    """Give the options that ask that server, with little patience."""
+    return ProposeTargets(
+        model=MODEL, address=vlm.url, key_variable=KEY_VARIABLE, pause_s=0.01, timeout_s=10.0
+    )

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from flows.licence import Licence
 from flows.preset import PRESETS, Preset
+from flows.proposal_options import ProposalOptions
 from flows.scene_request import SceneOptions, read_scene
 from flows.scene_run import SceneRequest
 from flows.wrong_use import WrongUse
@@ -57,6 +58,7 @@ def read_collection(
     preset: Preset | None = None,
     force: frozenset[str] = frozenset(),
     licence: Licence = "any",
+    proposal: ProposalOptions = ProposalOptions(),
 ) -> Collection:
     """Read a collection and look at every capture, before any work starts.
 
@@ -66,6 +68,7 @@ def read_collection(
         preset: the options of all steps; the file's if not given.
         force: steps that run even if cached, in every scene.
         licence: which models' licences are accepted, in every scene.
+        proposal: who proposes targets where the collection gives a scene none.
 
     Raises:
         WrongUse, BadInput: the file has an error, or the folder no capture in it.
@@ -84,12 +87,15 @@ def read_collection(
         raise WrongUse(
             f"no such collection: {path}; give a TOML or YAML file or a folder of captures"
         )
-    scenes, unreadable = _look_at(entries, force, licence)
+    scenes, unreadable = _look_at(entries, force, licence, proposal)
     return Collection(name, scenes, out, str(path), unreadable, remarks)
 
 
 def _look_at(
-    entries: Iterable[tuple[str, SceneOptions]], force: frozenset[str], licence: Licence
+    entries: Iterable[tuple[str, SceneOptions]],
+    force: frozenset[str],
+    licence: Licence,
+    proposal: ProposalOptions,
 ) -> tuple[tuple[SceneRequest, ...], tuple[UnreadableScene, ...]]:
     """Return the scenes that can be run, and those of which only the reason is known."""
     scenes, unreadable = [], []
@@ -98,7 +104,7 @@ def _look_at(
             if name in RESERVED:
                 raise BadInput(f"a scene cannot be called {name}, like a file of the collection")
             asked = dataclasses.replace(options, name=name, force=force, licence=licence)
-            scenes.append(read_scene(asked))
+            scenes.append(read_scene(proposal.applied(asked)))
         except (WrongUse, BadInput, UnreadableInput, OSError) as error:
             unreadable.append(UnreadableScene(name, str(error)))
     return tuple(scenes), tuple(unreadable)

@@ -13,6 +13,7 @@ from flows.command import EXIT_FAILED, EXIT_OF_STATUS, EXIT_OK, print_json, say
 from flows.command.scene_options import add_licence_option
 from flows.command.store_option import open_store, store_address
 from flows.preset import read_preset
+from flows.proposal_options import add_proposal_options, proposal_options
 from flows.step_runner import Runner, add_runner_options, step_runner
 from storage import Store
 from tasks.step import Budget
@@ -69,6 +70,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         dest="settings",
         help="change one option of --preset (embedded if not given), in place of the file's",
     )
+    add_proposal_options(parser)
     add_licence_option(parser)
     parser.add_argument(
         "--force", action="append", default=[], metavar="STEP", help="run a step even if cached"
@@ -99,6 +101,7 @@ def run(options: argparse.Namespace) -> int:
         preset=_preset(options),
         force=frozenset(options.force),
         licence=options.licence,
+        proposal=proposal_options(options),
     )
     for remark in collection.remarks:
         say(f"note: {remark}")

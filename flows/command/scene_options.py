@@ -8,6 +8,7 @@ from pathlib import Path
 from flows.command import say
 from flows.licence import LICENCES
 from flows.preset import read_preset
+from flows.proposal_options import add_proposal_options, proposal_options
 from flows.scene_request import SceneOptions, read_scene
 from flows.scene_run import SceneRequest
 from flows.wrong_use import WrongUse
@@ -38,6 +39,7 @@ def add_scene_options(parser: argparse.ArgumentParser) -> None:
         help="an object to factor out: a box in pixels of one photo; may be repeated",
     )
     parser.add_argument("--targets", metavar="FILE", help="boxes from a file like targets.json")
+    add_proposal_options(parser)
     parser.add_argument(
         "--cameras", metavar="FILE", help="known cameras: transforms.json or a COLMAP model"
     )
@@ -69,15 +71,17 @@ def add_licence_option(parser: argparse.ArgumentParser) -> None:
 def scene_request(options: argparse.Namespace) -> SceneRequest:
     """Check the options and return the scene they ask for, before any work starts."""
     request = read_scene(
-        SceneOptions(
-            capture=Path(options.capture),
-            out=Path(options.out),
-            preset=read_preset(options.preset, options.settings),
-            name=options.name,
-            cameras=Path(options.cameras) if options.cameras else None,
-            targets=_targets(options),
-            force=frozenset(options.force),
-            licence=options.licence,
+        proposal_options(options).applied(
+            SceneOptions(
+                capture=Path(options.capture),
+                out=Path(options.out),
+                preset=read_preset(options.preset, options.settings),
+                name=options.name,
+                cameras=Path(options.cameras) if options.cameras else None,
+                targets=_targets(options),
+                force=frozenset(options.force),
+                licence=options.licence,
+            )
         )
     )
     for remark in request.remarks:

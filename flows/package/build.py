@@ -85,7 +85,7 @@ def _targets(values: SceneValues) -> Json:
     return {
         "targets": [
             {"name": t.name, "image": t.photo, "box": list(t.box)}
-            for t in values.result.request.targets
+            for t in values.result.refs.targets
         ]
     }
 

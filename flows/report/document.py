@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from flows.report.proposal_document import proposal_document
 from flows.report.support_document import support_document
 from flows.report.values import ObjectValues, SceneValues
 from flows.scene_run import SceneResult
@@ -30,8 +31,8 @@ def scene_verdict(result: SceneResult) -> Verdict:
         return Verdict("failed", (refs.failure.reason,))
     verdict = Verdict()
     singles = (
-        refs.capture, refs.cameras, refs.reconstruction, refs.gravity_view, refs.background,
-        refs.scene, refs.trajectory, refs.renders,
+        refs.capture, refs.cameras, refs.proposal, refs.reconstruction, refs.gravity_view,
+        refs.background, refs.scene, refs.trajectory, refs.renders,
     )  # fmt: skip
     for ref in singles:
         if ref is not None:
@@ -78,6 +79,7 @@ def report_document(values: SceneValues) -> Json:
             "scale": _scale(values),
             "cameras": _cameras(values.cameras),
             "gravity": _gravity(values.gravity_view),
+            "proposal": proposal_document(values.proposal) if values.proposal else None,
             "supports": [support_document(s) for s in values.scene.supports]
             if values.scene
             else [],
@@ -186,7 +188,7 @@ def _objects(values: SceneValues) -> list[Json]:
     factored = {o.target.name: o for o in values.objects}
     failed = {t.name: (t, f) for t, f in values.result.refs.failed_targets}
     documents = []
-    for target in values.result.request.targets:
+    for target in values.result.refs.targets:
         if target.name in factored:
             documents.append(
                 _object(factored[target.name], motions.get(target.name), bodies.get(target.name))

@@ -9,6 +9,7 @@ from importlib.resources import files
 from flows.report.document import Json, object_verdict
 from flows.report.object_section import object_section
 from flows.report.points_section import points_section
+from flows.report.proposal_section import proposal_section
 from flows.report.scene_section import (
     background_section,
     depth_section,
@@ -64,6 +65,7 @@ def _sections(values: SceneValues, document: Json) -> list[Section]:
         objects.append(Section(name, object_section(factored, values, verdict), verdict.status))
     return [
         Section("Photos and renders" if values.renders else "Photos", photo_section(values)),
+        Section("Proposed targets", proposal_section(values), _status(values)),
         Section("The scene, upright", points_section(values)),
         *objects,
         *_failed_objects(document),
@@ -72,6 +74,10 @@ def _sections(values: SceneValues, document: Json) -> list[Section]:
         Section("Depth", depth_section(values)),
         Section("Steps", _marked("steps", steps_section(document))),
     ]
+
+
+def _status(values: SceneValues) -> str:
+    return values.proposal.verdict.status if values.proposal else ""
 
 
 def _marked(name: str, html: str) -> str:

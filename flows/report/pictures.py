@@ -86,11 +86,15 @@ def mask_overlay(
     return out
 
 
-def draw_box(rgb: Picture, box: tuple[float, float, float, float]) -> Picture:
+def draw_box(
+    rgb: Picture,
+    box: tuple[float, float, float, float],
+    colour: tuple[int, int, int] = (255, 90, 30),
+) -> Picture:
     """Draw a target's box (pixels of ``rgb``)."""
     import cv2
 
     x0, y0, x1, y1 = (round(v) for v in box)
     out = np.ascontiguousarray(rgb)
-    cv2.rectangle(out, (x0, y0), (x1, y1), (255, 90, 30), 2)
+    cv2.rectangle(out, (x0, y0), (x1, y1), colour, 2)
     return out

@@ -120,7 +120,7 @@ def _chosen_view(values: SceneValues) -> View:
     assert values.reconstruction is not None
     assert values.gravity_view is not None
     views = {view.photo: view for view in values.reconstruction.views}
-    wished = [t.photo for t in values.result.request.targets]
+    wished = [t.photo for t in values.result.refs.targets]
     wished.append(values.gravity_view.reference_photo)
     return next((views[photo] for photo in wished if photo in views), next(iter(views.values())))
 

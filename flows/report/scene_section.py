@@ -45,7 +45,7 @@ def _photos_only(values: SceneValues) -> str:
     figures = []
     for photo in values.capture.photos[:PHOTOS_SHOWN]:
         rgb, caption = photo.rgb.copy(), photo.name
-        for target in (t for t in values.result.request.targets if t.photo == photo.name):
+        for target in (t for t in values.result.refs.targets if t.photo == photo.name):
             factor = rgb.shape[1] / photo.original_size[0]
             x0, y0, x1, y1 = (factor * v for v in target.box)
             rgb = draw_box(rgb, (x0, y0, x1, y1))

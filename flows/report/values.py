@@ -21,6 +21,7 @@ from garden_models.scene import (
     Target,
     Trajectory,
 )
+from garden_models.targets.proposal import TargetProposal
 from tasks.step import Ref, load
 
 Noun = TypeVar("Noun")
@@ -51,6 +52,7 @@ class SceneValues:
     scene: SimScene | None
     trajectory: Trajectory | None
     renders: Renders | None
+    proposal: TargetProposal | None = None
 
 
 def load_values(result: SceneResult) -> SceneValues:
@@ -77,6 +79,7 @@ def load_values(result: SceneResult) -> SceneValues:
         _optional(refs.scene, SimScene),
         _optional(refs.trajectory, Trajectory),
         _optional(refs.renders, Renders),
+        _optional(refs.proposal, TargetProposal),
     )
 
 

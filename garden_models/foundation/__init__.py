@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from garden_models.foundation.model_card import ModelCard
 
-ADAPTERS: dict[str, str] = {}
+ADAPTERS: dict[str, str] = {
+    "grounding_dino": "garden_models.targets.grounding_dino",
+}
 """Whole module names by model name, so that a step's key sees which code it reaches."""
 
 

@@ -74,10 +74,12 @@ class ProposeTargets:
 class GroundTargets:
     """Find objects by their names in the photos, with an open-vocabulary detector."""
 
-    labels: tuple[str, ...] = ()
-    """What to look for; empty: look for nothing."""
+    model: str = ""
+    """The detector, such as grounding_dino; empty: ask none."""
 
-    model: str = "grounding_dino"
+    labels: tuple[str, ...] = ()
+    """What to look for, such as mug and chair."""
+
     min_score: float = 0.3
     """Detections below are left out (0..1)."""
 
@@ -121,12 +123,16 @@ def check_proposing(config: ProposeTargets) -> None:
         raise BadInput(f"propose.timeout_s must be positive, got {config.timeout_s}")
     if not config.pause_s >= 0:
         raise BadInput(f"propose.pause_s must not be negative, got {config.pause_s}")
+    if config.temperature is not None and not 0 <= float(config.temperature) <= 2:
+        raise BadInput(f"propose.temperature must be from 0 to 2, got {config.temperature}")
     if not config.goal.strip():
         raise BadInput("propose.goal is empty: say what the simulation is for")
 
 
 def check_grounding(config: GroundTargets) -> None:
-    """Raise BadInput for labels that cannot be looked for."""
+    """Raise BadInput for options with which nothing can be looked for."""
+    if not config.labels:
+        raise BadInput(f"{config.model} is not told what to look for: name it with ground.labels")
     for label in config.labels:
         if not any(character.isalnum() for character in label) or "." in label:
             raise BadInput(f"the label {label!r} names no object: use words without full stops")

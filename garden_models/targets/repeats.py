@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
+from garden_models.scene import Target
 from garden_models.targets.answered_targets import AnsweredTarget
 from garden_models.targets.box_convention import Box
 
@@ -30,7 +31,23 @@ def without_repeats(
         else:
             notes.append(f"{one.target.name}: the same box as {twin.target.name}, left out")
     kept, elsewhere = _in_one_photo_each(kept)
-    return _numbered(kept), notes + elsewhere
+    targets = with_own_names([one.target for one in kept])
+    named = (dataclasses.replace(k, target=t) for k, t in zip(kept, targets, strict=True))
+    return tuple(named), notes + elsewhere
+
+
+def with_own_names(targets: Sequence[Target]) -> tuple[Target, ...]:
+    """Return the targets, numbered where a name comes again."""
+    taken: set[str] = set()
+    named = []
+    for target in targets:
+        name, number = target.name, 1
+        while name.casefold() in taken:
+            number += 1
+            name = f"{target.name}_{number}"
+        taken.add(name.casefold())
+        named.append(dataclasses.replace(target, name=name))
+    return tuple(named)
 
 
 def overlap(a: Box, b: Box) -> float:
@@ -71,17 +88,3 @@ def _in_one_photo_each(
                 f"{chosen}; left out there"
             )
     return kept, notes
-
-
-def _numbered(answered: Sequence[AnsweredTarget]) -> tuple[AnsweredTarget, ...]:
-    taken: set[str] = set()
-    named = []
-    for one in answered:
-        name, number = one.target.name, 1
-        while name.casefold() in taken:
-            number += 1
-            name = f"{one.target.name}_{number}"
-        taken.add(name.casefold())
-        target = dataclasses.replace(one.target, name=name)
-        named.append(dataclasses.replace(one, target=target))
-    return tuple(named)

@@ -42,7 +42,7 @@ def cold_timing(request: SceneRequest, planned: TimedPlan, store: Store) -> Scen
             missing.append(step_name(entry.step, entry.label))
         elif record.key not in steps:  # equal calls in one scene are executed once
             steps[record.key] = _recorded(request.name, entry.label, record)
-    objects = tuple(target.name for target in request.targets)
+    objects = tuple(target.name for target in planned.result.refs.targets)
     missing += [name for name in unfinished(planned.result) if name not in missing]
     timing = SceneTiming(request.name, "cold", 1, objects, tuple(steps.values()), tuple(missing))
     wall_s = without_rendering(_reported_wall(request.package, set(steps)), timing)
@@ -55,7 +55,7 @@ def cached_timing(request: SceneRequest, planned: TimedPlan, number: int) -> Sce
         request.name,
         "cached",
         number,
-        tuple(target.name for target in request.targets),
+        tuple(target.name for target in planned.result.refs.targets),
         tuple(_looked_up(request.name, entry, planned, number) for entry in planned.plan),
         unfinished(planned.result),
         wall_s=planned.wall_s,

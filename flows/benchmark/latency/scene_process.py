@@ -79,7 +79,7 @@ def executed_timing(result: SceneResult, clock: StepClock, mode: Mode, number: i
         result.request.name,
         mode,
         number,
-        tuple(target.name for target in result.request.targets),
+        tuple(target.name for target in result.refs.targets),
         tuple(_step(e, clock.started.get((e.step, e.label)), mode, number) for e in executed),
         unfinished(result),
     )

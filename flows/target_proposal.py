@@ -1,0 +1,79 @@
+"""Have targets proposed where none were given: by a language model, or by their names."""
+
+from __future__ import annotations
+
+import dataclasses
+from concurrent.futures import Future
+from typing import Any, cast
+
+from flows.preset import Preset
+from garden_models.scene import BadInput, SparseModel, Target
+from garden_models.targets.config import check_grounding, check_proposing
+from garden_models.targets.proposal import TargetProposal
+from tasks.ground_targets import ground_targets
+from tasks.propose_targets import check_targets, propose_targets
+from tasks.step import PlanEntry, Ref, load
+from tasks.vlm.server import server_of
+
+
+def proposes(preset: Preset) -> bool:
+    """Tell whether a preset names who proposes targets."""
+    return bool(preset.propose.model or preset.ground.model)
+
+
+def check_proposal(preset: Preset) -> None:
+    """Raise BadInput if the preset's options of proposing do not go together."""
+    if preset.propose.model and preset.ground.model:
+        raise BadInput(
+            f"targets come either from {preset.propose.model} or from {preset.ground.model}: "
+            "leave out propose.model or ground.model"
+        )
+    if preset.propose.model:
+        check_proposing(preset.propose)
+    if preset.ground.model:
+        check_grounding(preset.ground)
+
+
+def check_key(plan: list[PlanEntry], preset: Preset) -> None:
+    """Raise BadInput if a model would be asked and the key to it is missing."""
+    steps = {entry.step for entry in plan if entry.action == "would run"}
+    if steps & {propose_targets.name, check_targets.name}:
+        server_of(preset.propose)
+
+
+def without_proposal(preset: Preset) -> Preset:
+    """Return the preset with nobody asked to propose."""
+    if not proposes(preset):
+        return preset
+    return dataclasses.replace(
+        preset,
+        propose=dataclasses.replace(preset.propose, model=""),
+        ground=dataclasses.replace(preset.ground, model=""),
+    )
+
+
+def look_for_targets(capture: Ref, cameras: Ref, preset: Preset) -> Future[Ref] | None:
+    """Start looking for targets in the registered photos; None if nobody is asked."""
+    if not proposes(preset):
+        return None
+    leave_out: Any = cameras
+    if not cameras.pending:
+        leave_out = load(cameras, SparseModel, fields=("unregistered",))["unregistered"]
+    if preset.ground.model:
+        return ground_targets.submit(capture, leave_out, preset.ground)
+    proposal = propose_targets.submit(capture, leave_out, preset.propose)
+    if not preset.propose.critic:
+        return proposal
+    return check_targets.submit(capture, leave_out, proposal, preset.propose)
+
+
+def targets_of(proposal: Ref) -> tuple[tuple[Target, ...], tuple[Target, ...]]:
+    """Return the targets to work on, and those that are known.
+
+    They are the same but in a plan in which the proposal would run first: there the pending
+    reference stands for all targets, so that what follows is planned to run after it.
+    """
+    if proposal.pending:
+        return (cast(Target, proposal),), ()
+    targets: tuple[Target, ...] = load(proposal, TargetProposal).targets
+    return targets, targets
