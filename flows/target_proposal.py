@@ -11,6 +11,7 @@ from garden_models.scene import BadInput, SparseModel, Target
 from garden_models.targets.config import check_grounding, check_proposing
 from garden_models.targets.proposal import TargetProposal
 from tasks.ground_targets import ground_targets
+from tasks.model.weights import weight_files
 from tasks.propose_targets import check_targets, propose_targets
 from tasks.step import PlanEntry, Ref, load
 from tasks.vlm.server import server_of
@@ -34,11 +35,13 @@ def check_proposal(preset: Preset) -> None:
         check_grounding(preset.ground)
 
 
-def check_key(plan: list[PlanEntry], preset: Preset) -> None:
-    """Raise BadInput if a model would be asked and the key to it is missing."""
+def check_askable(plan: list[PlanEntry], preset: Preset) -> None:
+    """Raise BadInput if a model would be asked whose key or weights are missing."""
     steps = {entry.step for entry in plan if entry.action == "would run"}
     if steps & {propose_targets.name, check_targets.name}:
         server_of(preset.propose)
+    if ground_targets.name in steps:
+        weight_files(preset.ground.model)
 
 
 def without_proposal(preset: Preset) -> Preset:

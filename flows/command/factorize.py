@@ -11,7 +11,7 @@ from flows.command.scene_options import add_scene_options, scene_request
 from flows.command.store_option import open_store
 from flows.scene_run import SceneResult, is_finished, plan_scene, run_scene
 from flows.step_runner import add_runner_options, step_runner
-from flows.target_proposal import check_key
+from flows.target_proposal import check_askable
 from storage import Store
 
 DESCRIPTION = """\
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
         document = _refresh(planned)
         say(f"{request.name}: nothing to do, everything is in the store and {request.package}")
     else:
-        check_key(plan, planned.request.preset)
+        check_askable(plan, planned.request.preset)
         result = _execute(options, planned, store)
         document = _write_report(result, store)
     _tell(document, request.package, time.monotonic() - started)

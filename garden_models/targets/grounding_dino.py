@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 from PIL import Image
+from safetensors import SafetensorError
 
 from garden_models.foundation.model_card import ModelCard, Terms, WeightFile
 from garden_models.scene import BadInput
@@ -135,7 +136,7 @@ def _network(weights: Path, device: str) -> Any:
         network, info = transformers.GroundingDinoForObjectDetection.from_pretrained(
             weights, local_files_only=True, output_loading_info=True
         )
-    except (OSError, ValueError, RuntimeError, KeyError) as error:
+    except (OSError, ValueError, RuntimeError, KeyError, SafetensorError) as error:
         raise BadInput(
             f"the weights in {weights} are not GroundingDINO's ({_line(error)}): put those of "
             "IDEA-Research/grounding-dino-tiny or -base there"

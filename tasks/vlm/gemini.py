@@ -46,9 +46,10 @@ def read(document: Json, model: str) -> tuple[VlmAnswer, str]:
     Raises LookupError, TypeError or AttributeError for another form.
     """
     usage = document.get("usageMetadata") or {}
-    candidates = document.get("candidates") or []
+    refused = document.get("promptFeedback")
+    candidates = document["candidates"] if refused is None else document.get("candidates")
     first = candidates[0] if candidates else {}
-    feedback = (document.get("promptFeedback") or {}).get("blockReason")
+    feedback = (refused or {}).get("blockReason")
     reason = str(first.get("finishReason") or feedback or "")
     parts = (first.get("content") or {}).get("parts") or []
     text = "".join(part.get("text", "") for part in parts if not part.get("thought"))

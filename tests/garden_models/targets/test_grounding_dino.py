@@ -38,6 +38,7 @@ def photo(width: int, height: int) -> np.ndarray:
     return rng.integers(0, 256, (height, width, 3)).astype(np.uint8)
 
 
+@pytest.mark.slow
 def test_it_is_registered_and_has_all_that_its_card_asks_for(weights: Path) -> None:
     assert ADAPTERS[CARD.name] == load.__module__
     assert card("grounding_dino").terms.commercial
@@ -75,6 +76,7 @@ def test_boxes_of_a_saved_network_are_those_of_its_own_processor(weights: Path) 
     assert (answer.scores <= float(theirs["scores"].max()) + 1e-5).all()
 
 
+@pytest.mark.slow
 def test_a_photo_is_prepared_as_its_own_processor_does() -> None:
     from transformers import GroundingDinoImageProcessorPil
 
@@ -137,6 +139,7 @@ def _with_cut_weights(folder: Path) -> None:
     (folder / "model.safetensors").write_bytes(b"x" * 64)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("harm", "words"),
     [
@@ -155,6 +158,7 @@ def test_a_damaged_folder_says_what_to_do(
         load(folder, "cpu")
 
 
+@pytest.mark.slow
 def test_more_words_than_it_reads_are_refused(weights: Path) -> None:
     labels = ("mug",) * 200
     with torch.inference_mode(), pytest.raises(BadInput, match="look for fewer at once"):

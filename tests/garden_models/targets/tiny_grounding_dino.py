@@ -29,7 +29,7 @@ def save_tiny(folder: Path) -> Path:
             vocab_size=len(WORDS), hidden_size=16, num_hidden_layers=1, num_attention_heads=2,
             intermediate_size=16, max_position_embeddings=512,
         ),
-        d_model=16, encoder_layers=2, decoder_layers=2, encoder_ffn_dim=16, decoder_ffn_dim=16,
+        d_model=32, encoder_layers=2, decoder_layers=2, encoder_ffn_dim=16, decoder_ffn_dim=16,
         encoder_attention_heads=2, decoder_attention_heads=2, num_queries=7,
         num_feature_levels=4, fusion_dropout=0.0, fusion_droppath=0.0,
     )  # fmt: skip

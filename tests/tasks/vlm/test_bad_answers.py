@@ -131,7 +131,7 @@ def test_what_can_be_used_is_used_and_the_rest_is_said(
         ('{"targets": []}', "proposed no target that can be used (for the goal: "),
         ("[]", "proposed no target that can be used"),
         ("I am sorry, I cannot help with that.", "holds no list of boxes: I am sorry"),
-        ('{"error": "overloaded", "code": [1, 2, 3, 4]}', "holds no list of boxes"),
+        ('{"error": "overloaded", "code": [1, 2, 3]}', "holds no list of boxes"),
         ("{" * 5000 + "[" * 5000, "holds no list of boxes"),
         (f"[{entry(photo='P9')}]", "proposed no target that can be used (mug: it names the photo"),
         ('{"targets": [{"name": "mug", "photo": "P1", "box_2d": [30', "holds no list of boxes"),
