@@ -16,7 +16,9 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 KEY = "k3y-that/must+never=be seen"
-KEY_VARIABLE = "GARDEN_TEST_MODEL_KEY"
+KEY_VARIABLE = "GARDEN_TEST_DOOR"
+"""No name by which a secret is known: only whoever asks the model knows that it holds one."""
+
 MODEL = "gemini-3-flash-preview"
 LOCAL_MODEL = "qwen3-vl-8b"
 

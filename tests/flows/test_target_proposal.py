@@ -82,6 +82,22 @@ def test_the_scene_goes_on_with_what_was_proposed(
     assert len(vlm.asked) == 2
 
 
+@pytest.mark.slow
+def test_prefect_runs_both_queries_as_tasks(
+    prefect_server: str, photos: Path, vlm: VlmServer, vlm_config: ProposeTargets, store: Store
+) -> None:
+    vlm.say(GOOD, GOOD, Reply(status=401))
+    wanted = request(photos, vlm_config)
+    result = run_scene(wanted, store, lambda _event: None, "prefect")
+    assert {e.step for e in result.outcomes} >= {*BEFORE, *PROPOSING, *EACH, *AFTER}
+    assert len(result.refs.targets) == 2
+    result = run_scene(
+        request(photos, vlm_config, attempt=2), store, lambda _event: None, "prefect"
+    )
+    assert result.refs.failure is not None
+    assert "refused the key" in result.refs.failure.reason
+
+
 @pytest.mark.parametrize(
     ("replies", "words"),
     [

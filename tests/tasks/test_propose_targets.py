@@ -83,7 +83,7 @@ def test_address_key_and_patience_are_no_part_of_the_key(
 ) -> None:
     vlm.say(GOOD, GOOD)
     ref, _outcomes = ask()
-    monkeypatch.delenv("GARDEN_TEST_MODEL_KEY")
+    monkeypatch.delenv("GARDEN_TEST_DOOR")
     changes = {"address": "http://127.0.0.1:9", "key_variable": "", "timeout_s": 1.0, "tries": 1}
     again, outcomes = ask(**changes)
     assert again.key == ref.key
@@ -146,7 +146,7 @@ def test_a_plan_asks_nobody(
     config: ProposeTargets,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.delenv("GARDEN_TEST_MODEL_KEY")
+    monkeypatch.delenv("GARDEN_TEST_DOOR")
     ref, planned = run(store, config, "plan")
     assert planned == [("propose_targets", "would run"), ("check_targets", "would run")]
     assert ref.pending

@@ -95,6 +95,11 @@ def test_removals_may_be_bare_names(check: Check) -> None:
     assert found.targets == (MUG,)
 
 
+def test_removals_count_in_an_answer_that_is_not_quite_json_too(check: Check) -> None:
+    said = targets_json(("mug", "P1", MUG_BOX), removed=[{"name": "chair", "why": "fixed"}])
+    assert check(said.replace("}]}", "},],}")).targets == (MUG,)
+
+
 def test_a_repair_that_cannot_be_used_leaves_the_target_as_it_was(check: Check) -> None:
     found = check(targets_json(("mug", "P1", [500, 100, 500, 200]), ("chair", "P2", CHAIR_BOX)))
     assert found.targets == (MUG, CHAIR)

@@ -56,9 +56,9 @@ def sentence(config: ProposeTargets) -> str:
     ("reply", "words"),
     [
         (failed(401, {"error": {"message": f"Incorrect API key provided: {KEY}"}}),
-         "refused the key in GARDEN_TEST_MODEL_KEY (401: Incorrect API key provided: ***)"),
+         "refused the key in GARDEN_TEST_DOOR (401: Incorrect API key provided: ***)"),
         (failed(403, {"error": {"message": "no access"}}), "refused the key"),
-        (failed(400, INVALID_KEY), "refused the key in GARDEN_TEST_MODEL_KEY (400: API key"),
+        (failed(400, INVALID_KEY), "refused the key in GARDEN_TEST_DOOR (400: API key"),
         (failed(404, [{"error": {"message": "is not found"}}]), f"knows no model {MODEL} (404: is"),
         (failed(400, {"error": {"message": "response_format?"}}), "propose.structured = false"),
         (failed(413, "too large"), "(413: "),
