@@ -70,8 +70,8 @@ def read_scene(options: SceneOptions) -> SceneRequest:
 
 def _variant(name: str) -> str | None:
     """Return which variant of a model this machine has."""
-    from tasks.model.found import variant_of
     from tasks.model.settings import model_settings
+    from tasks.model.variant import variant_of
 
     return variant_of(card(name), model_settings(name).weights)
 
