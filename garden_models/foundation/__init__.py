@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from garden_models.foundation.model_card import ModelCard
 
 ADAPTERS: dict[str, str] = {
+    "depth_anything_3": "garden_models.reconstruction.depth_anything_3",
+    "depth_anything_3_base": "garden_models.reconstruction.depth_anything_3_base",
+    "pi3": "garden_models.reconstruction.pi3",
+    "vggt": "garden_models.reconstruction.vggt",
     "grounding_dino": "garden_models.targets.grounding_dino",
 }
 """Whole module names by model name, so that a step's key sees which code it reaches."""

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
+
+from garden_models.scene import OK, Verdict
 
 
 @dataclass(frozen=True)
@@ -58,17 +60,32 @@ class GeometryView:
 
 
 @dataclass(frozen=True)
+class CameraTokens:
+    """What the model's camera decoder read of some views that it saw together.
+
+    ``kind`` names the network (``da3-giant``), ``views`` are indices into the prediction's
+    views, ``reference`` is the one of them that the model took as its reference.
+    """
+
+    kind: str
+    views: Int[np.ndarray, " n"]
+    tokens: Float[np.ndarray, "n c"]
+    reference: int
+
+
+@dataclass(frozen=True)
 class GeometryPrediction:
-    """Views in the order of the request, in one world; ``metric`` tells whether it is in
-    metres. ``reference`` is the view that the model took as its reference.
+    """Views in the order of the request, in one world: that of the given cameras if there
+    were some. ``metric`` tells whether the model knows metres by itself. ``verdict`` holds
+    remarks on how the prediction was made.
     """
 
     SCHEMA: ClassVar[str] = "garden.GeometryPrediction/1"
     views: tuple[GeometryView, ...]
     metric: bool
-    reference: int = 0
-    camera_tokens: Float[np.ndarray, "n c"] | None = None
+    camera_tokens: tuple[CameraTokens, ...] = ()
     gaussians: Gaussians | None = None
+    verdict: Verdict = OK
 
 
 PredictGeometry = Callable[[GeometryRequest], GeometryPrediction]

@@ -8,11 +8,12 @@ from zlib import crc32
 import cv2
 import numpy as np
 
-from garden_models.gravity.decoder.da3_tokens import camera_tokens, load_backbone
 from garden_models.gravity.training.datasets.read import read_dataset
 from garden_models.gravity.training.token_shard import TokenShard
 from garden_models.gravity.training.windows import Windows, windows_of
 from garden_models.progress import Progress, silent
+from garden_models.reconstruction.da3_camera_tokens import camera_tokens
+from garden_models.reconstruction.da3_network import load_network
 from garden_models.scene import BadInput
 
 
@@ -34,18 +35,18 @@ def extract_tokens(
         raise BadInput(f"{root} holds no sequence called {sequence}")
     own = known[sequence]
     true = own.gv_from_camera()
-    net, kind = load_backbone(backbone, device)
+    network = load_network(backbone, device)
     scenes = windows_of(len(own), windows, crc32(sequence.encode()))
     if not scenes:
         raise BadInput(f"{sequence} has {len(own)} photos: too few for a scene")
     tokens, references = [], []
     for k, chosen in enumerate(scenes):
         progress(k / len(scenes), f"{sequence}, scene {k} of {len(scenes)}")
-        found, reference = camera_tokens(net, [_photo(own.photos[i]) for i in chosen])
+        found, reference = camera_tokens(network, [_photo(own.photos[i]) for i in chosen])
         tokens.append(found.astype(np.float16))
         references.append(reference)
     return TokenShard(
-        kind,
+        network.kind,
         np.concatenate(tokens),
         np.concatenate([true[chosen] for chosen in scenes]).astype(np.float32),
         np.array(references),
