@@ -48,19 +48,10 @@ def read_gaussians(
                 rotation=rotation / length,
                 opacity=np.clip(opacities[i][use], 0, 1),
                 rgb=np.clip(colours[i][use], 0, 1),
+                view=np.full(int(use.sum()), i),
             )
         )
     return tuple(out)
-
-
-def joined(parts: Sequence[Gaussians]) -> Gaussians:
-    """Return the Gaussians of all parts."""
-    return Gaussians(
-        *(
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("mean", "scale", "rotation", "opacity", "rgb")
-        )
-    )
 
 
 def moved_by_view(parts: Sequence[Gaussians], moves: Sequence[Similarity]) -> tuple[Gaussians, ...]:

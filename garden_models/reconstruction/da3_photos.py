@@ -23,13 +23,23 @@ def prepare(photos: Sequence[Photo]) -> tuple[Float[np.ndarray, "n 3 h w"], tupl
     return normal.transpose(0, 3, 1, 2).astype(np.float32), framings
 
 
+def bounded_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Return (width, height) with the long side at 504."""
+    factor = LONG_SIDE / max(size)
+    return max(1, round(size[0] * factor)), max(1, round(size[1] * factor))
+
+
+def target_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Return (width, height) with the long side at 504, then both at multiples of 14."""
+    width, height = bounded_size(size)
+    return _nearest_multiple(width), _nearest_multiple(height)
+
+
 def resized(photo: Photo) -> Photo:
-    """Return a photo with its long side at 504, then its sides at multiples of 14."""
-    height, width = photo.shape[:2]
-    factor = LONG_SIDE / max(height, width)
-    first = (max(1, round(width * factor)), max(1, round(height * factor)))
-    bounded = _resize(photo, first, factor > 1)
-    second = (_nearest_multiple(first[0]), _nearest_multiple(first[1]))
+    """Return a photo at the size that the network reads, in the two steps of its own code."""
+    size = photo.shape[1], photo.shape[0]
+    first, second = bounded_size(size), target_size(size)
+    bounded = _resize(photo, first, max(size) < LONG_SIDE)
     return _resize(bounded, second, second[0] > first[0] or second[1] > first[1])
 
 

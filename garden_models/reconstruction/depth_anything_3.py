@@ -15,7 +15,8 @@ import torch
 from jaxtyping import Bool, Float
 
 from garden_models.foundation.model_card import ModelCard, WeightFile
-from garden_models.reconstruction.da3_gaussians import joined, moved_by_view, read_gaussians
+from garden_models.reconstruction.da3_gaussians import moved_by_view, read_gaussians
+from garden_models.reconstruction.da3_memory import memory_need
 from garden_models.reconstruction.da3_network import (
     GAUSSIAN_IMPORTS,
     STRATEGY,
@@ -32,12 +33,15 @@ from garden_models.reconstruction.geometry_model import (
     GeometryRequest,
     GeometryView,
     PredictGeometry,
+    joined_gaussians,
 )
 from garden_models.reconstruction.given_cameras import InGivenWorld, in_given_world
 from garden_models.reconstruction.model_contract import check_finite, check_request, proper_camera
 from garden_models.reconstruction.photo_framing import Framing
 from garden_models.reconstruction.similarity import from_camera
 from garden_models.scene import OK, BadGeometry, BadInput
+
+__all__ = ["CARD", "load", "memory_need"]
 
 SKY = 0.3
 """What the sky head says from which on a pixel is sky."""
@@ -193,7 +197,7 @@ def _moves(predicted: list[np.ndarray], given: InGivenWorld) -> list[Any]:
 
 def _gaussians(found: Any, keep: Bool[np.ndarray, "n h w"], moves: list[Any] | None) -> Gaussians:
     parts = read_gaussians(found["gaussians"], float(found.get("scale_factor", 1.0)), keep)
-    return joined(parts if moves is None else moved_by_view(parts, moves))
+    return joined_gaussians(parts if moves is None else moved_by_view(parts, moves))
 
 
 def _tokens(network: Da3Network, watched: Watched, request: GeometryRequest) -> CameraTokens:

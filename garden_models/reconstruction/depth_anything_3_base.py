@@ -7,9 +7,12 @@ from pathlib import Path
 
 from garden_models.foundation.model_card import WeightFile
 from garden_models.reconstruction import depth_anything_3
+from garden_models.reconstruction.da3_memory import memory_need
 from garden_models.reconstruction.da3_network import model_name
 from garden_models.reconstruction.geometry_model import PredictGeometry
 from garden_models.scene import BadInput
+
+__all__ = ["CARD", "load", "memory_need"]
 
 PERMISSIVE = ("da3-small", "da3-base", "da3metric-large")
 

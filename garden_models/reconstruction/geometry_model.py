@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 from typing import ClassVar
 
 import numpy as np
@@ -31,6 +31,7 @@ class GeometryRequest:
 class Gaussians:
     """3D Gaussians in the world of the cameras that they come with.
 
+    ``view`` is the index of the photo in which a Gaussian was found.
     ``scale`` is the standard deviation along each axis, ``rotation`` a unit quaternion wxyz
     (world from Gaussian), ``opacity`` in 0..1, ``rgb`` the view-independent colour in 0..1.
     """
@@ -41,6 +42,18 @@ class Gaussians:
     rotation: Float[np.ndarray, "g 4"]
     opacity: Float[np.ndarray, " g"]
     rgb: Float[np.ndarray, "g 3"]
+    view: Int[np.ndarray, " g"]
+
+    def subset(self, keep: Bool[np.ndarray, " g"]) -> Gaussians:
+        """Return the Gaussians that ``keep`` selects."""
+        return Gaussians(
+            self.mean[keep],
+            self.scale[keep],
+            self.rotation[keep],
+            self.opacity[keep],
+            self.rgb[keep],
+            self.view[keep],
+        )
 
 
 @dataclass(frozen=True)
@@ -86,6 +99,12 @@ class GeometryPrediction:
     camera_tokens: tuple[CameraTokens, ...] = ()
     gaussians: Gaussians | None = None
     verdict: Verdict = OK
+
+
+def joined_gaussians(parts: Sequence[Gaussians]) -> Gaussians:
+    """Return the Gaussians of all parts (at least one)."""
+    names = [f.name for f in fields(Gaussians)]
+    return Gaussians(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 
 
 PredictGeometry = Callable[[GeometryRequest], GeometryPrediction]

@@ -36,6 +36,20 @@ def read_weights(folder: Path) -> dict[str, torch.Tensor]:
     raise BadInput(f"{folder} holds no weights: put {' or '.join(WEIGHT_FILES)} there")
 
 
+def weight_names(folder: Path) -> set[str]:
+    """Return the names of a folder's weights without reading them, where the file allows it."""
+    path = folder / WEIGHT_FILES[0]
+    if not path.is_file():
+        return set(read_weights(folder))
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with safe_open(path, framework="pt") as opened:
+            return set(opened.keys())
+    except (OSError, SafetensorError) as error:
+        raise BadInput(f"{path} cannot be read ({error}): download it again") from error
+
+
 def load_network_class(
     module: str,
     name: str,

@@ -25,11 +25,14 @@ from garden_models.reconstruction.geometry_model import (
 )
 from garden_models.reconstruction.given_cameras import in_given_world
 from garden_models.reconstruction.load_network_class import load_network_class
+from garden_models.reconstruction.memory_need import RUNTIME_GB, MemoryNeed, weights_gb
 from garden_models.reconstruction.model_contract import check_finite, check_request, proper_camera
 from garden_models.reconstruction.model_precision import half_precision
 from garden_models.reconstruction.photo_framing import Framing, Photo, frame_photos
 
 WIDTH, PATCH = 518, 14
+TABLE_ROWS, PER_PHOTO_GB, DEPTH_HEAD_GB = 336, 0.195, 0.2
+"""See ``memory_need``."""
 
 CARD = ModelCard(
     name="vggt",
@@ -84,12 +87,28 @@ def predict(net: Any, request: GeometryRequest, device: torch.device) -> Geometr
     return GeometryPrediction(given.views, metric=False, verdict=given.verdict)
 
 
+def target_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Return (width, height): 518 wide, the height a multiple of 14."""
+    return WIDTH, max(PATCH, round(size[1] * WIDTH / size[0] / PATCH) * PATCH)
+
+
 def resized(photo: Photo) -> Photo:
-    """Return a photo 518 pixels wide, its height a multiple of 14."""
-    height, width = photo.shape[:2]
-    rows = max(PATCH, round(height * WIDTH / width / PATCH) * PATCH)
-    picture = Image.fromarray(photo).resize((WIDTH, rows), Image.Resampling.BICUBIC)
-    return np.asarray(picture, np.uint8)
+    """Return a photo at the size that the model reads, before it is cut to 518 high."""
+    size = target_size((photo.shape[1], photo.shape[0]))
+    return np.asarray(Image.fromarray(photo).resize(size, Image.Resampling.BICUBIC), np.uint8)
+
+
+def memory_need(weights: Path, request: GeometryRequest) -> MemoryNeed:
+    """Return what the network needs for photos like those of the request.
+
+    Its own table for photos of 518 x 336 (1.69 GB and 0.195 GB a photo, up to 200) is
+    proportional to the tokens, of which all 24 layers are kept; the depth head takes 0.2 GB
+    for each of the 8 photos that it works on at once (its paper, section 4).
+    """
+    rows = [min(target_size((p.shape[1], p.shape[0]))[1], WIDTH) for p in request.photos]
+    share = max(rows) / TABLE_ROWS
+    fixed = RUNTIME_GB + weights_gb(weights)
+    return MemoryNeed(fixed, PER_PHOTO_GB * share, DEPTH_HEAD_GB * share, 8)
 
 
 def confidence_share(confidence: Float[np.ndarray, "*s"]) -> Float[np.ndarray, "*s"]:
