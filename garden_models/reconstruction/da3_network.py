@@ -15,7 +15,6 @@ import torch
 from torch import Tensor
 
 from garden_models.reconstruction.load_network_class import read_weights
-from garden_models.reconstruction.model_precision import half_precision
 from garden_models.scene import BadInput
 
 STRATEGY = "saddle_balanced"
@@ -157,7 +156,7 @@ def watching(network: Da3Network) -> Iterator[Watched]:
             )
         )
     try:
-        with torch.inference_mode(), half_precision(network.device):
+        with torch.inference_mode():
             yield watched
     finally:
         for hook in hooks:

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
-from garden_models.foundation.model_card import ModelCard, WeightFile
+from garden_models.foundation.model_card import ModelCard, Terms, WeightFile
 from garden_models.reconstruction.da3_gaussians import moved_by_view, read_gaussians
 from garden_models.reconstruction.da3_memory import memory_need
 from garden_models.reconstruction.da3_network import (
@@ -51,21 +51,22 @@ LEAST_DISTANCE = 0.1
 RELATIVE = ("da3mono-large",)
 """Networks whose depth is right up to a change of scale in each photo."""
 
+FREE = Terms("Apache-2.0", "Apache-2.0", commercial=True)
 CARD = ModelCard(
     name="depth_anything_3",
     title="Depth-Anything-3 (small to giant, metric, nested)",
     source="https://github.com/ByteDance-Seed/Depth-Anything-3",
     stage="reconstruct",
-    code_licence="Apache-2.0",
-    weights_licence="CC BY-NC 4.0 (large, giant, nested); Apache-2.0 (small, base, metric)",
-    commercial=False,
+    terms=Terms("Apache-2.0", "CC BY-NC 4.0", commercial=False),
     weights=(
-        WeightFile("config.json", "depth-anything/DA3NESTED-GIANT-LARGE-1.1 or another size"),
+        WeightFile("config.json", "of depth-anything/DA3NESTED-GIANT-LARGE-1.1 or another size"),
         WeightFile("model.safetensors"),
     ),
     imports=("depth_anything_3", "omegaconf", "addict", "einops", "safetensors"),
     install="pip install --no-deps depth-anything-3 && pip install omegaconf addict einops "
     "(Gaussians also need evo and e3nn)",
+    variant_key="model_name",
+    variants=dict.fromkeys(("da3-small", "da3-base", "da3metric-large"), FREE),
 )
 
 

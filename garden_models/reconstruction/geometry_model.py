@@ -100,6 +100,16 @@ class GeometryPrediction:
     gaussians: Gaussians | None = None
     verdict: Verdict = OK
 
+    def fits(self, request: GeometryRequest) -> str:
+        """Return what of the answer does not go with the request; nothing if all does."""
+        if len(self.views) != len(request.photos):
+            return f"{len(self.views)} views for {len(request.photos)} photos"
+        if request.want_gaussians and self.gaussians is None:
+            return "no Gaussians, which were asked for"
+        if request.want_tokens and not self.camera_tokens:
+            return "no camera tokens, which were asked for"
+        return ""
+
 
 def joined_gaussians(parts: Sequence[Gaussians]) -> Gaussians:
     """Return the Gaussians of all parts (at least one)."""

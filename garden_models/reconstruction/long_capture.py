@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import torch
-
+from garden_models.foundation.failure import ModelOutOfMemory
 from garden_models.progress import Progress, silent
 from garden_models.reconstruction.chunk_merging import merge_chunks
 from garden_models.reconstruction.geometry_model import (
@@ -45,7 +44,8 @@ def predict_long(
     """Return the geometry of all photos, in chunks where they do not fit at once.
 
     How many fit is predicted by ``need``. Where memory runs out all the same, chunks are
-    halved, and the verdict says so. Raises BadInput if not even the smallest chunk fits.
+    halved, and the verdict says so. Raises BadInput if not even the smallest chunk should fit,
+    ModelOutOfMemory if it does not.
     """
     photos = len(request.photos)
     size = min(photos, need.most_photos(limits.gpu_memory_gb))
@@ -61,10 +61,9 @@ def predict_long(
         merged = _in_chunks(request, predict, size, limits, progress)
         if merged is not None:
             return replace(merged, verdict=merged.verdict.worst(Verdict("ok", remarks)))
-        _free_memory()
         smaller = max(fewest, -(-size // 2))
         if smaller == size:
-            raise MemoryError(
+            raise ModelOutOfMemory(
                 f"GPU memory ran out with {size} photos at once, the fewest that can be joined: "
                 "close what else uses the GPU, or use a smaller model"
             )
@@ -88,7 +87,7 @@ def _in_chunks(
         progress(done / len(chunks), f"photos {chunk.start + 1} to {chunk.stop}")
         try:
             predictions.append(predict(part_of(request, chunk)))
-        except (torch.OutOfMemoryError, MemoryError):
+        except MemoryError:
             return None
     if len(chunks) == 1:
         return predictions[0]
@@ -106,8 +105,3 @@ def part_of(request: GeometryRequest, chunk: range) -> GeometryRequest:
         if request.camera_from_world is None
         else request.camera_from_world[part],
     )
-
-
-def _free_memory() -> None:
-    if torch.cuda.is_initialized():
-        torch.cuda.empty_cache()

@@ -15,7 +15,7 @@ import torch
 from jaxtyping import Float
 from PIL import Image
 
-from garden_models.foundation.model_card import ModelCard, WeightFile
+from garden_models.foundation.model_card import ModelCard, Terms, WeightFile
 from garden_models.geometry.rigid import homogeneous, invert_rigid
 from garden_models.reconstruction.geometry_model import (
     GeometryPrediction,
@@ -28,7 +28,6 @@ from garden_models.reconstruction.intrinsics_from_points import intrinsics_from_
 from garden_models.reconstruction.load_network_class import load_network_class, weight_names
 from garden_models.reconstruction.memory_need import RUNTIME_GB, MemoryNeed, weights_gb
 from garden_models.reconstruction.model_contract import check_finite, check_request, proper_camera
-from garden_models.reconstruction.model_precision import half_precision
 from garden_models.reconstruction.photo_framing import Framing, Photo, frame_photos
 from garden_models.scene import BadGeometry
 
@@ -43,9 +42,7 @@ CARD = ModelCard(
     title="Pi3 and Pi3X",
     source="https://github.com/yyfz/Pi3",
     stage="reconstruct",
-    code_licence="BSD-3-Clause",
-    weights_licence="CC BY-NC 4.0",
-    commercial=False,
+    terms=Terms("BSD-3-Clause", "CC BY-NC 4.0", commercial=False),
     weights=(WeightFile("model.safetensors", "yyfz233/Pi3X or yyfz233/Pi3"),),
     imports=("pi3", "safetensors"),
     install="git clone https://github.com/yyfz/Pi3 and put the clone on PYTHONPATH",
@@ -71,13 +68,7 @@ def predict(
     pictures, framings = frame_photos(request.photos, resized)
     batch = torch.from_numpy(pictures.transpose(0, 3, 1, 2).astype(np.float32) / 255)[None]
     given = _given(request, framings, device) if metric else {}
-    # The network varies the unit of given cameras at random.
-    with (
-        torch.random.fork_rng(devices=[device] if device.type == "cuda" else []),
-        torch.inference_mode(),
-        half_precision(device),
-    ):
-        torch.manual_seed(0)
+    with torch.inference_mode():
         found = net(batch.to(device), **given)
     poses = check_finite(_numpy(found["camera_poses"]), "cameras")
     points, logits = _numpy(found["local_points"]), _numpy(found["conf"])[..., 0]

@@ -15,7 +15,7 @@ import torch
 from jaxtyping import Float
 from PIL import Image
 
-from garden_models.foundation.model_card import ModelCard, WeightFile
+from garden_models.foundation.model_card import ModelCard, Terms, WeightFile
 from garden_models.geometry.rotation import matrix_from_quaternion
 from garden_models.reconstruction.geometry_model import (
     GeometryPrediction,
@@ -27,7 +27,6 @@ from garden_models.reconstruction.given_cameras import in_given_world
 from garden_models.reconstruction.load_network_class import load_network_class
 from garden_models.reconstruction.memory_need import RUNTIME_GB, MemoryNeed, weights_gb
 from garden_models.reconstruction.model_contract import check_finite, check_request, proper_camera
-from garden_models.reconstruction.model_precision import half_precision
 from garden_models.reconstruction.photo_framing import Framing, Photo, frame_photos
 
 WIDTH, PATCH = 518, 14
@@ -39,13 +38,12 @@ CARD = ModelCard(
     title="VGGT",
     source="https://github.com/facebookresearch/vggt",
     stage="reconstruct",
-    code_licence="VGGT License",
-    weights_licence="CC BY-NC 4.0 (VGGT-1B); VGGT-1B-Commercial allows commercial use",
-    commercial=False,
-    weights=(
-        WeightFile("config.json", "facebook/VGGT-1B; only if model.safetensors comes with one"),
-        WeightFile("model.safetensors", "facebook/VGGT-1B"),
+    terms=Terms(
+        "VGGT License",
+        "CC BY-NC 4.0",
+        commercial=False,
     ),
+    weights=(WeightFile("model.safetensors", "of facebook/VGGT-1B"),),
     imports=("vggt", "safetensors"),
     install="git clone https://github.com/facebookresearch/vggt && pip install --no-deps ./vggt",
 )
@@ -72,7 +70,7 @@ def predict(net: Any, request: GeometryRequest, device: torch.device) -> Geometr
     check_request(request, CARD.name)
     pictures, framings = frame_photos(request.photos, resized, longest=WIDTH)
     batch = torch.from_numpy(pictures.transpose(0, 3, 1, 2).astype(np.float32) / 255)
-    with torch.inference_mode(), half_precision(device):
+    with torch.inference_mode():
         found = net(batch.to(device))
     encoding = check_finite(_numpy(found["pose_enc"]), "cameras")
     depth = _numpy(found["depth"])[..., 0]

@@ -9,7 +9,6 @@ import torch
 from garden_models.geometry.rotation import axis_angle
 from garden_models.gravity.decoder.checkpoint import from_bytes, to_bytes
 from garden_models.gravity.decoder.config import DecoderConfig
-from garden_models.gravity.decoder.da3_tokens import MEAN, STD, prepare
 from garden_models.gravity.decoder.from_tokens import down_from_tokens
 from garden_models.gravity.decoder.network import GravityViewDecoder
 from garden_models.scene import BadInput
@@ -47,12 +46,3 @@ def test_what_does_not_go_together_is_refused(known):
     ):
         with pytest.raises(BadInput, match=message):
             down_from_tokens(known, tokens, reference, cameras)
-
-
-def test_photos_are_prepared_as_the_backbone_reads_them():
-    grey = np.full((300, 400, 3), 255, np.uint8)
-    found = prepare([grey, np.full((600, 800, 3), 255, np.uint8)])
-    assert found.shape == (2, 3, 378, 504)  # long side 504, both multiples of 14
-    np.testing.assert_allclose(found[1, :, 5, 5], (1 - MEAN) / STD, rtol=1e-5)
-    tall = prepare([np.zeros((400, 300, 3), np.uint8), grey])
-    assert tall.shape == (2, 3, 378, 378)
