@@ -150,12 +150,14 @@ def weighted_similarity(
     points_b: Float[np.ndarray, "n 3"],
     weight: Float[np.ndarray, " n"],
 ) -> Similarity:
-    """Return the similarity with the least weighted sum of squares (Umeyama 1991)."""
+    """Return the weighted least-squares similarity (Umeyama 1991), its scale symmetric (Horn
+    1987): noise in either set must not shrink what is joined, chunk after chunk.
+    """
     share = weight / weight.sum()
     mean_a, mean_b = share @ points_a, share @ points_b
     a, b = points_a - mean_a, points_b - mean_b
-    u, d, vt = np.linalg.svd((share[:, None] * b).T @ a)
+    u, _, vt = np.linalg.svd((share[:, None] * b).T @ a)
     sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt))])
     rotation = (u * sign) @ vt
-    scale = float((d * sign).sum() / max(float(share @ (a**2).sum(1)), 1e-300))
+    scale = float(((share @ (b**2).sum(1)) / max(share @ (a**2).sum(1), 1e-300)) ** 0.5)
     return Similarity(scale, rotation, mean_b - scale * rotation @ mean_a)

@@ -67,7 +67,7 @@ class AnyView(nn.Module):
                 camera[:3, :3] = camera[:3, :3].T
             rows, columns = self.truth.photos[index].shape[:2]
             whole = _whole_size(columns, rows)
-            K = self.truth.model_K(index, whole, (width, height))
+            K = self.truth.model_intrinsics(index, whole, (width, height))
             if extrinsics is not None:
                 self._check_cameras(extrinsics, intrinsics, found, Ks, K)
             cameras.append(camera[:3])

@@ -34,14 +34,14 @@ class Pi3(nn.Module):
         assert imgs.dtype == torch.float32 and imgs.ndim == 5 and imgs.shape[2] == 3, imgs.shape
         height, width = imgs.shape[-2:]
         assert height % 14 == 0 and width % 14 == 0 and height * width <= 255_000
-        assert 0 <= float(imgs.min()) and float(imgs.max()) <= 1
+        assert float(imgs.min()) >= 0 and float(imgs.max()) <= 1
         found = self.truth.recognised(imgs[0].permute(0, 2, 3, 1).numpy() * 255, cut=True)
         odd = np.eye(4)
         odd[:3, :3], odd[:3, 3] = axis_angle(np.array([1.0, 2.0, 0.5]), 1.1), (4.0, -2.0, 1.0)
         poses, points, Ks = [], [], []
         for index in found:
             rows, columns = self.truth.photos[index].shape[:2]
-            K = self.truth.model_K(index, _whole_size(columns, rows), (width, height))
+            K = self.truth.model_intrinsics(index, _whole_size(columns, rows), (width, height))
             depth = self.truth.depth_at(index, K, (width, height))
             u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
             rays = np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones_like(u)], -1)

@@ -74,7 +74,9 @@ class TrueViews:
             np.clip(column.astype(int), 0, depth.shape[1] - 1),
         ].astype(np.float32)
 
-    def model_K(self, index: int, whole: tuple[int, int], cut: tuple[int, int]) -> np.ndarray:
+    def model_intrinsics(
+        self, index: int, whole: tuple[int, int], cut: tuple[int, int]
+    ) -> np.ndarray:
         """Intrinsics after a resize to ``whole`` and a cut about the middle to ``cut``."""
         height, width = self.photos[index].shape[:2]
         K = np.diag([whole[0] / width, whole[1] / height, 1.0]) @ self.K[index]

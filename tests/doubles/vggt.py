@@ -46,7 +46,7 @@ class VGGT(nn.Module):
         assert images.dtype == torch.float32 and images.shape[2] == 3, images.shape
         height, width = images.shape[-2:]
         assert width == 518 and height % 14 == 0 and height <= 518, images.shape
-        assert 0 <= float(images.min()) and float(images.max()) <= 1
+        assert float(images.min()) >= 0 and float(images.max()) <= 1
         pictures = images[0].permute(0, 2, 3, 1).numpy() * 255
         found = self.truth.recognised(pictures, cut=True)
         world = invert_rigid(self.truth.camera_from_world[found[0]])
@@ -55,7 +55,7 @@ class VGGT(nn.Module):
             camera = homogeneous(self.truth.camera_from_world[index]) @ world
             rows, columns = self.truth.photos[index].shape[:2]
             whole = (518, round(rows * 518 / columns / 14) * 14)
-            K = self.truth.model_K(index, whole, (width, height))
+            K = self.truth.model_intrinsics(index, whole, (width, height))
             w, x, y, z = quaternion_from_matrix(camera[:3, :3])
             fov = 2 * np.arctan([height / 2 / K[1, 1], width / 2 / K[0, 0]])
             encodings.append(np.r_[camera[:3, 3] / self.unit, x, y, z, w, fov])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 from types import ModuleType
 
@@ -21,47 +22,54 @@ def test_long_side_504_both_multiples_of_14_imagenet_statistics():
     assert tall.shape == (2, 3, 378, 378)
 
 
-def stub_torchvision(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The three transforms that the model's own code takes from torchvision."""
+class ToTensor:
+    def __call__(self, image):
+        return torch.from_numpy(np.array(image)).permute(2, 0, 1).float() / 255
 
-    class CenterCrop:
-        def __init__(self, size):
-            self.size = size
 
-        def __call__(self, image):
-            height, width = image.shape[-2:]
-            top, left = round((height - self.size[0]) / 2), round((width - self.size[1]) / 2)
-            return image[..., top : top + self.size[0], left : left + self.size[1]]
+class Normalize:
+    def __init__(self, mean, std):
+        self.mean, self.std = (torch.tensor(v)[:, None, None] for v in (mean, std))
 
+    def __call__(self, image):
+        return (image - self.mean) / self.std
+
+
+class CenterCrop:
+    def __init__(self, size):
+        self.size = size
+
+    def __call__(self, image):
+        height, width = image.shape[-2:]
+        top, left = round((height - self.size[0]) / 2), round((width - self.size[1]) / 2)
+        return image[..., top : top + self.size[0], left : left + self.size[1]]
+
+
+@pytest.fixture
+def own_processor(monkeypatch):
+    """The model's own code, with the three transforms that it takes from torchvision."""
+    pytest.importorskip("depth_anything_3")
     transforms = ModuleType("torchvision.transforms")
-    transforms.ToTensor = lambda: (
-        lambda image: torch.from_numpy(np.array(image)).permute(2, 0, 1).float() / 255
-    )
-    transforms.Normalize = lambda mean, std: (
-        lambda image: (image - torch.tensor(mean)[:, None, None]) / torch.tensor(std)[:, None, None]
-    )
-    transforms.CenterCrop = CenterCrop
+    for transform in (ToTensor, Normalize, CenterCrop):
+        setattr(transforms, transform.__name__, transform)
     package = ModuleType("torchvision")
     package.transforms = transforms
     monkeypatch.setitem(sys.modules, "torchvision", package)
     monkeypatch.setitem(sys.modules, "torchvision.transforms", transforms)
-    for name in [n for n in sys.modules if n.startswith("depth_anything_3.utils.io")]:
-        monkeypatch.delitem(sys.modules, name)
+    name = "depth_anything_3.utils.io.input_processor"
+    yield importlib.import_module(name).InputProcessor()
+    sys.modules.pop(name)
 
 
 @pytest.mark.parametrize(
     "sizes",
     [[(400, 300)], [(300, 400), (1000, 700)], [(1037, 611)], [(505, 497), (503, 210)], [(90, 70)]],
 )
-def test_they_are_the_same_pixels(sizes, monkeypatch):
-    pytest.importorskip("depth_anything_3")
-    stub_torchvision(monkeypatch)
-    from depth_anything_3.utils.io.input_processor import InputProcessor
-
+def test_they_are_the_same_pixels(sizes, own_processor):
     rng = np.random.default_rng(0)
     photos = [rng.integers(0, 255, (h, w, 3), dtype=np.uint8) for w, h in sizes]
     K = np.stack([np.array([[300.0, 0, w / 3], [0, 310, h / 2], [0, 0, 1]]) for w, h in sizes])
-    own, _, own_K = InputProcessor()(photos, None, K, 504, "upper_bound_resize", num_workers=1)
+    own, _, own_K = own_processor(photos, None, K, 504, "upper_bound_resize", num_workers=1)
     ours, framings = prepare(photos)
     np.testing.assert_allclose(own.numpy(), ours, atol=2e-6)
     found = [framing.model_intrinsics(k) for framing, k in zip(framings, K, strict=True)]

@@ -276,7 +276,7 @@ def test_the_metric_network_needs_cameras_and_gives_metres():
         def forward(self, x, extrinsics, intrinsics, **_options):
             assert extrinsics is None and intrinsics is None
             size = x.shape[-1], x.shape[-2]
-            K = truth.model_K(0, size, size)
+            K = truth.model_intrinsics(0, size, size)
             depth = np.stack([truth.depth_at(i, K, size) for i in range(2)]) * 300 / K[0, 0]
             sky = torch.zeros(1, 2, *x.shape[-2:])
             sky[:, :, :20] = 1

@@ -50,7 +50,7 @@ def test_intrinsics_are_fitted_through_noise_and_wild_points():
     points = pixel_rays(pixel_grid(210, 280), K) * depth[..., None]
     points[..., :2] += rng.normal(size=(210, 280, 2)) * 0.01
     wild = rng.random((210, 280)) < 0.2
-    points[wild] = rng.normal(size=(int(wild.sum()), 3)) + [0, 0, 3]
+    points[wild] = rng.normal((0, 0, 3), 1, (int(wild.sum()), 3))
     found = intrinsics_from_points(points, np.ones((210, 280)))
     np.testing.assert_allclose(found, K, rtol=0.01)
     with pytest.raises(ValueError, match="too few"):
