@@ -99,8 +99,8 @@ def _match(a: GeometryView, b: GeometryView) -> Matches:
     depth_b = b.depth[rows, columns].astype(np.float64)
     pixels = pixel_grid(height, width)[rows, columns]
     return Matches(
-        _lift(pixels, depth_a, a),
-        _lift(pixels, depth_b, b),
+        lift(pixels, depth_a, a),
+        lift(pixels, depth_b, b),
         depth_a,
         depth_b,
         np.minimum(a.confidence[rows, columns], b.confidence[rows, columns]).astype(np.float64)
@@ -108,11 +108,21 @@ def _match(a: GeometryView, b: GeometryView) -> Matches:
     )
 
 
-def _lift(
+def lift(
     pixels: Float[np.ndarray, "n 2"], depth: Float[np.ndarray, " n"], view: GeometryView
 ) -> Float[np.ndarray, "n 3"]:
-    points_camera = pixel_rays(pixels, view.K) * depth[:, None]
-    return transform_points(invert_rigid(view.camera_from_world), points_camera)
+    """Return the world points at some pixels of a view."""
+    return lift_pixels(pixels, depth, view.K, view.camera_from_world)
+
+
+def lift_pixels(
+    pixels: Float[np.ndarray, "n 2"],
+    depth: Float[np.ndarray, " n"],
+    K: Float[np.ndarray, "3 3"],
+    camera_from_world: Float[np.ndarray, "r 4"],
+) -> Float[np.ndarray, "n 3"]:
+    """Return the world points at some pixels, of these z-depths."""
+    return transform_points(invert_rigid(camera_from_world), pixel_rays(pixels, K) * depth[:, None])
 
 
 def _start(

@@ -22,6 +22,8 @@ SH_C0 = 0.28209479177387814
 MEAN = torch.tensor([0.485, 0.456, 0.406])[:, None, None]
 STD = torch.tensor([0.229, 0.224, 0.225])[:, None, None]
 WIDTH = 6
+LONG_SIDE = 504
+"""Of the source; smaller in tests that have no time."""
 
 
 class GaussianAdapter(nn.Module):
@@ -92,7 +94,7 @@ class AnyView(nn.Module):
 
     def _pictures(self, x: Tensor) -> np.ndarray:
         assert x.dtype == torch.float32 and x.ndim == 5 and x.shape[:1] == (1,), x.shape
-        assert x.shape[2] == 3 and max(x.shape[-2:]) <= 504
+        assert x.shape[2] == 3 and max(x.shape[-2:]) <= LONG_SIDE
         assert x.shape[-1] % 14 == 0 and x.shape[-2] % 14 == 0, x.shape
         pictures = (x[0].cpu() * STD + MEAN).permute(0, 2, 3, 1).numpy()
         assert pictures.min() > -0.02 and pictures.max() < 1.02, "not ImageNet's statistics"
@@ -172,8 +174,8 @@ def da3_double(
 
 
 def _whole_size(width: int, height: int) -> tuple[int, int]:
-    """Long side 504, then both to the nearest multiple of 14, ties up (input_processor.py)."""
-    scale = 504 / max(width, height)
+    """Long side first, then both to the nearest multiple of 14, ties up (input_processor.py)."""
+    scale = LONG_SIDE / max(width, height)
     sides = [round(width * scale), round(height * scale)]
     return tuple(int(14 * np.floor(side / 14 + 0.5)) for side in sides)  # type: ignore[return-value]
 
