@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 
 @dataclass(frozen=True)
 class Segment:
     """How a box becomes masks. Lengths are relative to the points' spacing or the box."""
+
+    method: Literal["geometric", "sam3", "sam2"] = "geometric"
+    """What finds the object's pixels: points and colours, or a model asked with boxes."""
 
     surroundings: float = 0.5
     """How far around the box (in boxes) points are looked at, for its support and rivals."""

@@ -16,7 +16,6 @@ from garden_models.progress import Progress, silent
 from garden_models.scene import (
     GravityView,
     ObjectMasks,
-    PointCloud,
     Reconstruction,
     Rivals,
     Target,
@@ -34,6 +33,7 @@ from garden_models.segmentation.node_labels import (
     nearness,
 )
 from garden_models.segmentation.occlusion import compare_outline
+from garden_models.segmentation.own_points import points_near
 from garden_models.segmentation.region import BoxView, box_evidence, boxes_and_nodes
 from garden_models.segmentation.scene_in_gv import SceneInGV, scene_in_gv
 from garden_models.segmentation.support import support_of
@@ -94,8 +94,9 @@ def segment(
 
     progress(0.92, "collecting the object's points")
     masks = tuple(_masks(reconstruction.views, refined))
-    points = _own_points(scene, graph, candidates[0], refined)
-    own = graph.cloud.subset(refined.labels.argmax(1) == 1)
+    is_own = refined.labels.argmax(1) == 1
+    points = points_near(scene.cloud, graph.cloud, is_own)
+    own = graph.cloud.subset(is_own)
     outlined = [
         compare_outline(own, mask, view, camera)
         for view, mask, camera in zip(reconstruction.views, masks, scene.cameras, strict=True)
@@ -232,26 +233,3 @@ def _masks(views: tuple[View, ...], refined: _Refined) -> Iterator[Bool[np.ndarr
             evident = (window.node >= 0) & (label > 0.5)
             mask[window.rows, window.columns] = tidy_mask(target > 0.5, evident)
         yield mask
-
-
-def _own_points(
-    scene: SceneInGV, graph: NodeGraph, candidate: Candidate, refined: _Refined
-) -> PointCloud:
-    """Return the fused points whose nearest node is the target's.
-
-    Nodes were thinned where there were many; points further from all nodes than the
-    thinned nodes are from each other are no target.
-    """
-    own = refined.labels.argmax(1) == 1
-    if not own.any():
-        return scene.cloud.subset(np.zeros(0, np.int64))
-    xyz = graph.cloud.xyz
-    reach = 3 * float(np.median(graph.cloud.spacing))
-    low, high = xyz[own].min(0) - reach, xyz[own].max(0) + reach
-    near = np.flatnonzero(((scene.cloud.xyz >= low) & (scene.cloud.xyz <= high)).all(1))
-    distance, index = cKDTree(xyz).query(
-        scene.cloud.xyz[near], distance_upper_bound=reach, workers=2
-    )
-    hit = np.isfinite(distance)
-    hit[hit] = own[index[hit]]
-    return scene.cloud.subset(near[hit])
