@@ -303,7 +303,8 @@ class ObjectMesh:
 
     ``observed`` tells for each vertex whether a photo saw it (False: closed by support
     plane, symmetry or interpolation; ``completion`` says which were used).
-    ``gv_from_object`` is where the object was seen when the mesh was made.
+    ``gv_from_object`` is where the object was seen when the mesh was made; it leans if a
+    model that made the mesh put it so.
     """
 
     SCHEMA: ClassVar[str] = "garden.ObjectMesh/1"
@@ -321,7 +322,7 @@ class ObjectMesh:
 @dataclass(frozen=True)
 class PlacementHypothesis:
     """One candidate pose; ``scores`` hold at least mask_iou, depth_residual_m,
-    support_gap_m and total (higher total is better).
+    support_gap_m and total (higher total is better), and tilt_deg where poses may lean.
     """
 
     name: str

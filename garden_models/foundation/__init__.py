@@ -20,6 +20,7 @@ ADAPTERS: dict[str, str] = {
     "pi3": "garden_models.reconstruction.pi3",
     "vggt": "garden_models.reconstruction.vggt",
     "sam2": "garden_models.segmentation.sam2",
+    "sam3d_objects": "garden_models.meshing.sam3d_objects",
     "sam3": "garden_models.segmentation.sam3_tracker",
     "grounding_dino": "garden_models.targets.grounding_dino",
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -138,8 +139,18 @@ def _blend(
     return VertexColours((chosen * share[..., None]).sum(axis=0), observed, observed)
 
 
+class Colours(Protocol):
+    """What knows the colours at places of a surface."""
+
+    def sample(
+        self, points: Float[np.ndarray, "n 3"], normals: Float[np.ndarray, "n 3"], /
+    ) -> VertexColours:
+        """Return the colours at points with outward normals."""
+        ...
+
+
 def refine_for_colour(
-    surface: TriangleSurface, source: ColourSource, max_faces: int, least_error: float = 6.0
+    surface: TriangleSurface, source: Colours, max_faces: int, least_error: float = 6.0
 ) -> TriangleSurface:
     """Split edges whose middle has another colour than the blend of its ends.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 
 @dataclass(frozen=True)
@@ -13,8 +14,8 @@ class MeshObject:
     settings serve any scale.
     """
 
-    method: str = "fusion"
-    """Name of the method (the embedded backend has this one)."""
+    method: Literal["fusion", "sam3d_objects"] = "fusion"
+    """Whether the photos' depth and silhouettes are fused, or a model completes the object."""
 
     max_resolution: int = 160
     """Most voxels along the object's longest side; fewer where pixels are coarser."""
