@@ -21,6 +21,7 @@ ADAPTERS: dict[str, str] = {
     "vggt": "garden_models.reconstruction.vggt",
     "sam2": "garden_models.segmentation.sam2",
     "sam3d_objects": "garden_models.meshing.sam3d_objects",
+    "foundation_pose": "garden_models.placement.foundation_pose",
     "sam3": "garden_models.segmentation.sam3_tracker",
     "grounding_dino": "garden_models.targets.grounding_dino",
 }

@@ -83,7 +83,9 @@ class Comparison:
         return hits, out
 
     def scores(self, pose: UprightPose, config: PlaceObject) -> dict[str, float]:
-        """Return mask_iou, depth_residual_m, colour_rmse (0..255), support_gap_m and total."""
+        """Return mask_iou, depth_residual_m, colour_rmse (0..255), support_gap_m and total;
+        with a method whose poses may lean, tilt_deg too.
+        """
         hits, views = self.render(pose)
         size = self.size * pose.scale
         overlaps, residuals, differences = [], [], []
@@ -107,14 +109,18 @@ class Comparison:
             - config.depth_weight * depth / size
             - config.colour_weight * colour / 255.0
             - config.support_weight * gap / size
+            - config.tilt_weight * pose.tilt_deg / 90.0
         )
-        return {
+        scores = {
             "mask_iou": iou,
             "depth_residual_m": depth,
             "colour_rmse": colour,
             "support_gap_m": gap,
             "total": float(total),
         }
+        if config.method != "render_and_compare":
+            scores["tilt_deg"] = pose.tilt_deg
+        return scores
 
     def support_gap(self, pose: UprightPose) -> float:
         """Return the distance between the lowest vertex and the support, metres."""

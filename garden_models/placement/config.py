@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 
 @dataclass(frozen=True)
@@ -12,8 +13,8 @@ class PlaceObject:
     Lengths are shares of the object's size (the diagonal of its bounding box).
     """
 
-    method: str = "render_and_compare"
-    """Name of the method (the embedded backend has this one)."""
+    method: Literal["render_and_compare", "foundation_pose"] = "render_and_compare"
+    """What proposes poses: our own search, or FoundationPose beside it in the same gate."""
 
     max_views: int = 8
     """Most views that are compared; spread around the object."""
@@ -39,6 +40,26 @@ class PlaceObject:
     support_weight: float = 1.0
     """Cost in mask IoU of a gap to the support as large as the object."""
 
+    rotations: Literal["both", "upright", "free"] = "both"
+    """Rotations that FoundationPose may take: turns about gravity, all, or first the ones, then
+    the others. ``free`` leaves gravity out (the paper's ablation "w/o GV")."""
+
+    gate: bool = True
+    """Whether the best of all hypotheses is taken; else FoundationPose's own best, as it is
+    (with ``rotations`` "free": the paper's ablation "full FP pose")."""
+
+    iterations: int = 5
+    """FoundationPose's refinements of every hypothesis."""
+
+    model_poses: int = 3
+    """Most of FoundationPose's poses, upright and free each, that enter the gate."""
+
+    tilt_weight: float = 2.0
+    """Cost in mask IoU of a lean by 90 degrees."""
+
+    most_tilt_deg: float = 5.0
+    """Lean of the chosen pose above which the placement is degraded."""
+
     least_gain: float = 0.004
     """Gain in the total score under which the pose of the mesh's making is kept."""
 
@@ -53,6 +74,11 @@ class PlaceObject:
             raise ValueError(
                 "max_views must be at least 1 and pixels_per_view at least 100, got "
                 f"{self.max_views} and {self.pixels_per_view}"
+            )
+        if self.iterations < 1 or self.model_poses < 1:
+            raise ValueError(
+                "iterations and model_poses must be positive, got "
+                f"{self.iterations} and {self.model_poses}"
             )
         if self.yaw_starts < 1 or self.refined_starts < 0 or self.refine_steps < 1:
             raise ValueError(

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from garden_models.geometry.upright import tilt_deg
 from garden_models.placement.compare import Comparison
 from garden_models.placement.config import PlaceObject
+from garden_models.placement.model_poses import ModelPoses, ask_model, judge_model
 from garden_models.placement.observation import observe
-from garden_models.placement.pose import UprightPose
+from garden_models.placement.pose import UPRIGHT_DEG, UprightPose
+from garden_models.placement.pose_model import EstimatePose
 from garden_models.placement.refine import refine
 from garden_models.placement.register import register_to_points
 from garden_models.placement.starts import pose_from_points
@@ -28,6 +31,9 @@ AS_MESHED = "as meshed"
 SAME_YAW_DEG = 12.0
 """Headings closer than this lead to the same refined pose."""
 
+LEAN_DEG = 0.1
+"""A lean above this is said."""
+
 AMBIGUOUS = 0.03
 """Difference in total score under which two far headings cannot be told apart."""
 
@@ -39,12 +45,15 @@ def place(
     mesh: ObjectMesh,
     config: PlaceObject | None = None,
     progress: Progress = silent,
+    estimate: EstimatePose | None = None,
 ) -> Placement:
-    """Return scored upright poses of the mesh (translation, yaw, scale) and the best one.
+    """Return scored poses of the mesh (translation, yaw, scale) and the best one.
 
     The rotation is restricted to yaw about gravity (paper, section 3.2). The mesh may come
     from anywhere: its heading, position and size are also searched from the object's points.
-    Raises BadGeometry if no view sees the object.
+    With the method ``foundation_pose``, ``estimate`` asks that model; its poses, some of them
+    free, and the pose of the mesh's making are judged in the same gate. Raises BadGeometry if
+    no view sees the object.
     """
     config = config or PlaceObject()
     progress(0.0, "picking views to compare")
@@ -55,7 +64,19 @@ def place(
         )
     support = None if masks.support is None else float(masks.support.height_gv)
     comparison = Comparison(mesh, seen, support)
-    hypotheses = _hypotheses(comparison, masks, mesh, config, progress)
+    answered = ModelPoses()
+    if config.method == "foundation_pose":
+        if estimate is None:
+            raise ValueError("the method foundation_pose needs what asks the model")
+        progress(0.05, "asking FoundationPose")
+        answered = ask_model(reconstruction, gravity_view, masks, mesh, estimate, config)
+    hypotheses = {AS_MESHED: UprightPose.of(mesh.gv_from_object)}
+    if config.gate:
+        hypotheses |= _own_hypotheses(comparison, masks, mesh, config, progress)
+    hypotheses |= answered.poses
+    if config.gate:
+        hypotheses |= _refined_model_poses(comparison, answered, config)
+        hypotheses |= _set_on_support(comparison, hypotheses)
     progress(0.9, f"judging {len(hypotheses)} poses")
     scored = tuple(
         PlacementHypothesis(
@@ -67,25 +88,25 @@ def place(
         )
         for name, pose in hypotheses.items()
     )
-    chosen, why = _gate(scored, config)
+    chosen, why = _gate(scored, config) if config.gate else _ungated(scored, answered)
     progress(1.0, why)
-    return Placement(
-        mesh.name, scored, chosen, why, _verdict(scored, chosen, comparison.size, masks, config)
-    )
+    verdict = _verdict(scored, chosen, comparison.size, masks, config)
+    verdict = verdict.worst(judge_model(answered, scored, chosen, masks.target.name, config))
+    return Placement(mesh.name, scored, chosen, why, verdict)
 
 
-def _hypotheses(
+def _own_hypotheses(
     comparison: Comparison,
     masks: ObjectMasks,
     mesh: ObjectMesh,
     config: PlaceObject,
     progress: Progress,
 ) -> dict[str, UprightPose]:
-    """Return named poses; the first is where the object was meshed."""
-    start = UprightPose.of(mesh.gv_from_object)
-    poses = {AS_MESHED: start}
+    """Return named upright poses, found from where the object was meshed and from its points."""
+    meshed = UprightPose.of(mesh.gv_from_object)
+    start = meshed.made_upright(comparison.vertices)
+    poses = {} if start is meshed else {f"{AS_MESHED}, made upright": start}
     points = np.asarray(masks.points_gv.xyz, float)
-    support = comparison.support_height
     progress(0.1, "refining the pose of the mesh's making")
     steps = config.refine_steps
     poses["refined translation and yaw"] = refine(comparison, start, steps, with_scale=False)
@@ -96,12 +117,40 @@ def _hypotheses(
     progress(0.4, f"trying {config.yaw_starts} headings")
     for heading, pose in _headings(comparison, start, points, config):
         poses[f"heading {heading:+.0f} deg, refined"] = refine(comparison, pose, 2 * steps)
-    if support is not None:
-        for name, pose in list(poses.items()):
-            snapped = pose.lowered_to(support, comparison.vertices)
-            if abs(snapped.translation_gv[1] - pose.translation_gv[1]) > 1e-6 * comparison.size:
-                poses[f"{name}, set on its support"] = snapped
     return poses
+
+
+def _refined_model_poses(
+    comparison: Comparison, answered: ModelPoses, config: PlaceObject
+) -> dict[str, UprightPose]:
+    """Return the model's best upright pose refined by our own comparison."""
+    upright = [(name, p) for name, p in answered.poses.items() if p.tilt_deg < UPRIGHT_DEG]
+    return {
+        f"{name}, refined": refine(comparison, pose, config.refine_steps)
+        for name, pose in upright[:1]
+    }
+
+
+def _set_on_support(
+    comparison: Comparison, poses: dict[str, UprightPose]
+) -> dict[str, UprightPose]:
+    """Return those poses that do not touch the support, lowered or raised to it."""
+    if comparison.support_height is None:
+        return {}
+    out = {}
+    for name, pose in poses.items():
+        snapped = pose.lowered_to(comparison.support_height, comparison.vertices)
+        if abs(snapped.translation_gv[1] - pose.translation_gv[1]) > 1e-6 * comparison.size:
+            out[f"{name}, set on its support"] = snapped
+    return out
+
+
+def _ungated(scored: tuple[PlacementHypothesis, ...], answered: ModelPoses) -> tuple[int, str]:
+    """Take the model's own best pose as it is; without one the pose of the mesh's making."""
+    if not answered.poses:
+        return 0, f"kept {AS_MESHED!r}: FoundationPose gave no pose, and nothing else was tried"
+    first = next(iter(answered.poses))
+    return [one.name for one in scored].index(first), f"took {first!r} as it is, without the gate"
 
 
 def _headings(
@@ -171,6 +220,11 @@ def _verdict(
         problems.append(
             f"{name!r} is {residual:.0%} of its size away from the measured depth on average"
         )
+    lean = tilt_deg(best.rotation_gv)
+    if lean > config.most_tilt_deg:
+        problems.append(f"{name!r} leans by {lean:.0f} degrees where it was placed")
+    elif lean > LEAN_DEG:
+        remarks.append(f"{name!r} leans by {lean:.1f} degrees where it was placed")
     if masks.support is None:
         problems.append(f"nothing carries {name!r}, so its height rests on depth alone")
     for other in scored:

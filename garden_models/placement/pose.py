@@ -1,4 +1,4 @@
-"""Define an upright pose: translation, yaw about gravity, and scale (paper, section 3.2)."""
+"""Define a pose that turns about gravity: translation, yaw, and scale (paper, section 3.2)."""
 
 from __future__ import annotations
 
@@ -8,13 +8,18 @@ import numpy as np
 from jaxtyping import Float
 
 from garden_models.geometry.rotation import yaw_gv
+from garden_models.geometry.upright import nearest_yaw, tilt_deg
+
+UPRIGHT_DEG = 1e-4
+"""What leans less is upright but for rounding."""
 
 
 @dataclass(frozen=True)
 class UprightPose:
-    """Similarity from the object frame to GV; ``base`` is the upright frame at yaw 0.
+    """Similarity from the object frame to GV; ``base`` is the rotation at yaw 0.
 
-    A point p goes to ``scale * yaw_gv(yaw) @ base @ p + translation``.
+    It is upright unless ``base`` leans, as a foreign model's pose may. A point p goes to
+    ``scale * yaw_gv(yaw) @ base @ p + translation``.
     """
 
     yaw_rad: float
@@ -32,6 +37,20 @@ class UprightPose:
     def rotation_gv(self) -> Float[np.ndarray, "3 3"]:
         """Rotation from the object frame to GV."""
         return yaw_gv(self.yaw_rad) @ self.base
+
+    @property
+    def tilt_deg(self) -> float:
+        """How far the object leans."""
+        return tilt_deg(self.rotation_gv)
+
+    def made_upright(self, vertices_object: Float[np.ndarray, "v 3"]) -> UprightPose:
+        """Return the pose with the nearest upright rotation, turned about the mesh's middle."""
+        if self.tilt_deg < UPRIGHT_DEG:
+            return self
+        base = yaw_gv(nearest_yaw(self.rotation_gv))
+        middle = 0.5 * (vertices_object.min(axis=0) + vertices_object.max(axis=0))
+        there = self.apply(middle[None])[0]
+        return UprightPose(0.0, there - self.scale * base @ middle, self.scale, base)
 
     def apply(self, points_object: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """Return points in GV."""
