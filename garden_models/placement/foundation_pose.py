@@ -12,8 +12,9 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from pickle import UnpicklingError
 from typing import Any
@@ -76,6 +77,7 @@ def load(weights: Path, device: str) -> EstimatePose:
         torch.cuda.set_device(device)
     with _first_on_path(weights), _tensors_only(), _usual_tensors():
         code = import_code(CARD, "estimater")
+        _give_extension(code)
         for part, package in NEEDED.items():
             if getattr(code, part, None) is None:
                 raise BadInput(f"{CARD.title} works only with {package}: {CARD.install}")
@@ -231,6 +233,14 @@ def _numpy(value: Any) -> Float[np.ndarray, "*n"]:
     if not np.isfinite(out).all():
         raise ModelFailed(f"{CARD.title} gave numbers that are not finite")
     return out
+
+
+def _give_extension(code: Any) -> None:
+    """Let the extension be one that is installed: the model looks in its own build folder."""
+    if getattr(code, "mycpp", None) is None:
+        with suppress(ImportError):
+            built = import_module("mycpp")
+            code.mycpp = built if hasattr(built, "cluster_poses") else None
 
 
 @contextmanager

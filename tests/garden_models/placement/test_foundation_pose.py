@@ -224,6 +224,18 @@ def test_a_half_built_clone_is_refused(
         foundation_pose.load(clone, "cuda")
 
 
+def test_an_extension_that_is_installed_is_as_good_as_one_in_the_clone(
+    monkeypatch: pytest.MonkeyPatch, clone: Path
+) -> None:
+    """The environment's recipe builds it once, for any clone."""
+    extension = ModuleType("mycpp")
+    extension.cluster_poses = print
+    monkeypatch.setitem(sys.modules, "mycpp", extension)
+    published(monkeypatch, mycpp=None)
+    assert isinstance(foundation_pose.load(clone, "cuda"), FoundationPose)
+    assert sys.modules["estimater"].mycpp is extension
+
+
 def test_what_is_missing_is_said(clone: Path) -> None:
     with pytest.raises(BadInput, match="CUDA GPU only"):
         foundation_pose.load(clone, "cpu")
