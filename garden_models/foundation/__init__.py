@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 ADAPTERS: dict[str, str] = {
     "depth_anything_3": "garden_models.reconstruction.depth_anything_3",
     "depth_anything_3_base": "garden_models.reconstruction.depth_anything_3_base",
-    "pi3": "garden_models.reconstruction.pi3",
     "vggt": "garden_models.reconstruction.vggt",
+    "pi3": "garden_models.reconstruction.pi3",
+    "grounding_dino": "garden_models.targets.grounding_dino",
+    "sam3": "garden_models.segmentation.sam3_tracker",
     "sam2": "garden_models.segmentation.sam2",
     "sam3d_objects": "garden_models.meshing.sam3d_objects",
     "foundation_pose": "garden_models.placement.foundation_pose",
-    "sam3": "garden_models.segmentation.sam3_tracker",
-    "grounding_dino": "garden_models.targets.grounding_dino",
 }
 """Whole module names by model name, so that a step's key sees which code it reaches."""
 
