@@ -8,7 +8,14 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from storage.redact import HIDDEN, redact, redacted, secrets, without_secrets
+from storage.redact import (
+    HIDDEN,
+    redact,
+    redacted,
+    secrets,
+    without_secret_variables,
+    without_secrets,
+)
 
 SECRET = "wJalrXUtnFEMI/K7MDENG+bPxRfiCY"
 NAMES = [
@@ -101,3 +108,21 @@ def test_an_error_with_a_secret_does_not_get_out(monkeypatch: pytest.MonkeyPatch
     assert caught.value.__suppress_context__
     with pytest.raises(ValueError, match="plain"), without_secrets():
         raise ValueError("plain")
+
+
+def test_programs_that_need_no_secret_are_given_none() -> None:
+    environment = {
+        "PATH": "/bin",
+        "HOME": "/home/me",
+        "TOKENIZERS_PARALLELISM": "false",
+        "AWS_SHARED_CREDENTIALS_FILE": "/home/me/.aws/credentials",
+        "GEMINI_API_KEY": "AIza-123456789",
+        "HF_TOKEN": "hf_abcdefgh",
+        "PIN_PASSWORD": "1234",
+        "DATABASE_URL": "postgresql://me:hunter2-hunter2@host/garden",
+        "no_proxy": "localhost",
+    }
+    kept = without_secret_variables(environment)
+    assert kept.keys() == {
+        "PATH", "HOME", "TOKENIZERS_PARALLELISM", "AWS_SHARED_CREDENTIALS_FILE", "no_proxy",
+    }  # fmt: skip

@@ -27,7 +27,7 @@ def _depth_anything_3(folder: Path, variant: str) -> None:
         raise WrongUse(f"Depth-Anything-3 has no {variant}: there are {', '.join(registry)}")
     torch.manual_seed(SEED)
     network = configuration.create_object(configuration.load_config(registry[variant]))
-    state = {f"model.{name}": tensor.contiguous() for name, tensor in network.state_dict().items()}
+    state = {f"model.{name}": tensor.clone() for name, tensor in network.state_dict().items()}
     save_file(state, folder / "model.safetensors")
     (folder / "config.json").write_text(json.dumps({"model_name": variant}), "utf-8")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 from pathlib import Path
 
@@ -24,7 +25,7 @@ CARD = ModelCard(
 
 def load(weights: Path, device: str) -> Ask:
     with (weights / "loads.txt").open("a") as loads:
-        loads.write(f"{device}\n")
+        loads.write(f"{device} {os.environ.get('CUDA_VISIBLE_DEVICES')}\n")
     factor = float((weights / "factor.txt").read_text())
 
     def ask(question: Question) -> Answer:
