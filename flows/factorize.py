@@ -6,6 +6,13 @@ from dataclasses import dataclass
 from functools import partial
 
 from flows.preset import Preset
+from flows.scene_geometry import (
+    background_gaussians,
+    by_model,
+    fused_prediction,
+    prediction_and_cameras,
+    predicted_gravity,
+)
 from flows.target_proposal import look_for_targets, targets_of
 from garden_models.scene import Rivals, Target
 from tasks.align_gravity import align_gravity
@@ -41,6 +48,7 @@ class SceneRefs:
 
     targets: tuple[Target, ...]
     capture: Ref | None = None
+    prediction: Ref | None = None
     cameras: Ref | None = None
     proposal: Ref | None = None
     reconstruction: Ref | None = None
@@ -48,6 +56,7 @@ class SceneRefs:
     objects: tuple[FactoredObject, ...] = ()
     failed_targets: tuple[tuple[Target, StepFailed], ...] = ()
     background: Ref | None = None
+    gaussians: Ref | None = None
     scene: Ref | None = None
     trajectory: Ref | None = None
     renders: Ref | None = None
@@ -64,12 +73,19 @@ def factorize_scene(
     ends the scene. Raises StepFailed.
     """
     refs.capture = ingest(source, preset.ingest)
-    refs.cameras = register(refs.capture, preset.register)
+    if by_model(preset):
+        refs.prediction, refs.cameras = prediction_and_cameras(refs.capture, preset)
+    else:
+        refs.cameras = register(refs.capture, preset.register)
     if refs.cameras.failed:
-        raise StepFailed("register", "", "; ".join(refs.cameras.reasons), kind="BadGeometry")
+        raise StepFailed(refs.cameras.step, "", "; ".join(refs.cameras.reasons), kind="BadGeometry")
     looking = None if targets else look_for_targets(refs.capture, refs.cameras, preset)
-    refs.reconstruction = reconstruct(refs.capture, refs.cameras, preset.reconstruct)
-    refs.gravity_view = align_gravity(refs.reconstruction, preset.gravity)
+    if refs.prediction is not None:
+        refs.reconstruction = fused_prediction(refs.capture, refs.cameras, refs.prediction, preset)
+        refs.gravity_view = predicted_gravity(refs.reconstruction, refs.prediction, preset)
+    else:
+        refs.reconstruction = reconstruct(refs.capture, refs.cameras, preset.reconstruct)
+        refs.gravity_view = align_gravity(refs.reconstruction, preset.gravity)
     if looking is not None:
         refs.proposal = looking.result()
         targets, refs.targets = targets_of(refs.proposal)
@@ -86,6 +102,9 @@ def factorize_scene(
     labels = tuple(o.labels for o in refs.objects)
     refs.background = clean_background(
         refs.reconstruction, refs.gravity_view, labels, masks, preset.background
+    )
+    refs.gaussians = background_gaussians(
+        refs.reconstruction, refs.gravity_view, refs.prediction, labels, preset
     )
     refs.scene = compose(
         refs.reconstruction,

@@ -13,12 +13,15 @@ from typing import Any
 from garden_models.scene import BadInput
 from garden_models.targets.config import GroundTargets, ProposeTargets
 from tasks.align_gravity import AlignGravity
+from tasks.align_gravity_by_tokens import TokenGravity
 from tasks.clean_background import CleanBackground
 from tasks.compose import Compose
+from tasks.fuse_prediction import FusePrediction
 from tasks.ingest import Ingest
 from tasks.label_points import LabelPoints
 from tasks.mesh_object import MeshObject
 from tasks.place_object import PlaceObject
+from tasks.predict_geometry import PhotoGeometry
 from tasks.reconstruct import DenseStereo
 from tasks.register import Registration
 from tasks.render import RenderViews
@@ -31,11 +34,14 @@ class Preset:
     """The options of every step; the defaults are the embedded backends (CPU, offline)."""
 
     ingest: Ingest = field(default_factory=Ingest)
+    geometry: PhotoGeometry = field(default_factory=PhotoGeometry)
     register: Registration = field(default_factory=Registration)
     propose: ProposeTargets = field(default_factory=ProposeTargets)
     ground: GroundTargets = field(default_factory=GroundTargets)
     reconstruct: DenseStereo = field(default_factory=DenseStereo)
+    fusion: FusePrediction = field(default_factory=FusePrediction)
     gravity: AlignGravity = field(default_factory=AlignGravity)
+    token_gravity: TokenGravity = field(default_factory=TokenGravity)
     segment: Segment = field(default_factory=Segment)
     mesh: MeshObject = field(default_factory=MeshObject)
     place: PlaceObject = field(default_factory=PlaceObject)

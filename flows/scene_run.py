@@ -17,7 +17,7 @@ from garden_models.scene import Target
 from storage import Store
 from storage.formats.package import check_writable, package_source
 from tasks.ingest import CaptureSource
-from tasks.step import Budget, PlanEntry, RunContext, StepEvent, StepFailed, run_context
+from tasks.step import Budget, PlanEntry, Ref, RunContext, StepEvent, StepFailed, run_context
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def package_key(result: SceneResult) -> str:
         ref.content if ref else None
         for ref in (
             refs.capture, refs.cameras, refs.reconstruction, refs.gravity_view, refs.background,
-            refs.scene, refs.trajectory, refs.renders,
+            refs.scene, refs.trajectory, refs.renders, *_predicted(refs),
         )
     ]  # fmt: skip
     objects = [
@@ -148,6 +148,11 @@ def package_key(result: SceneResult) -> str:
     made_from = PACKAGE_VERSION, result.request.name, contents, objects, failed
     proposal = () if refs.proposal is None else (refs.proposal.content,)
     return digest_value((*made_from, result.request.remarks, *proposal), domain="garden.package/1")
+
+
+def _predicted(refs: SceneRefs) -> list[Ref | None]:
+    """Return what only a model's geometry has, nothing without one."""
+    return [] if refs.prediction is None else [refs.prediction, refs.gaussians]
 
 
 def _as_event(entry: PlanEntry, scene: str) -> StepEvent:

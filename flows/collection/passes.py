@@ -15,6 +15,7 @@ from flows.preset import Preset
 WAVE = 32
 
 STEP_OF = {
+    "geometry": "predict_geometry",
     "reconstruct": "reconstruct",
     "gravity": "align_gravity",
     "segment": "segment",

@@ -8,19 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from flows.package.frames import GLTF_FROM_GV, ZUP_FROM_GV, frames_document
+from flows.package.background import background_files
+from flows.package.frames import GLTF_FROM_GV, frames_document
 from flows.package.licences import licences_document
 from flows.package.mujoco_files import mujoco_files
 from flows.report.document import Json, report_document
 from flows.report.page import report_page
 from flows.report.values import SceneValues
-from garden_models.geometry.rigid import transform_points
-from garden_models.reconstruction.surfels import surfels
 from garden_models.scene import Background, SimScene
 from storage.formats.colmap import colmap_model
 from storage.formats.glb import GlbNode, scene_glb
 from storage.formats.nerfstudio import transforms_json
-from storage.formats.ply import gaussians_ply, points_ply
 from storage.formats.png import depth_png, mask_png
 from storage.redact import redact
 
@@ -45,7 +43,7 @@ def package_files(values: SceneValues) -> tuple[dict[str, bytes], Json]:
     if values.gravity_view is not None and values.cameras is not None:
         files["frames.json"] = dump_json(frames_document(values.gravity_view, values.cameras.scale))
     if values.background is not None:
-        files |= _background_files(values.background)
+        files |= background_files(values.background, values.gaussians)
     if values.scene is not None and values.trajectory is not None:
         files |= mujoco_files(values.scene, values.trajectory)
         files["scene.glb"] = _glb(values.scene, values.background)
@@ -114,19 +112,6 @@ def _view_files(values: SceneValues) -> dict[str, bytes]:
                 name = f"masks/{factored.target.name}/{stem}.png"
                 files[name] = mask_png(factored.masks.masks[i])
     return files
-
-
-def _background_files(background: Background) -> dict[str, bytes]:
-    points = background.points_gv
-    xyz = transform_points(ZUP_FROM_GV, points.xyz)
-    normal = points.normal @ ZUP_FROM_GV[:3, :3].T
-    splats = surfels(xyz, normal, points.spacing)
-    return {
-        "background/points.ply": points_ply(xyz, points.rgb, normal),
-        "background/splat.ply": gaussians_ply(
-            splats.means, splats.scales, splats.quaternions_wxyz, splats.opacities, points.rgb
-        ),
-    }
 
 
 def _glb(scene: SimScene, background: Background | None) -> bytes:

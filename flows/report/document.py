@@ -31,8 +31,9 @@ def scene_verdict(result: SceneResult) -> Verdict:
         return Verdict("failed", (refs.failure.reason,))
     verdict = Verdict()
     singles = (
-        refs.capture, refs.cameras, refs.proposal, refs.reconstruction, refs.gravity_view,
-        refs.background, refs.scene, refs.trajectory, refs.renders,
+        refs.capture, refs.prediction, refs.cameras, refs.proposal, refs.reconstruction,
+        refs.gravity_view, refs.background, refs.gaussians, refs.scene, refs.trajectory,
+        refs.renders,
     )  # fmt: skip
     for ref in singles:
         if ref is not None:

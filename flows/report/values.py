@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from flows.scene_run import SceneResult
+from garden_models.reconstruction.geometry_model import Gaussians
 from garden_models.scene import (
     Background,
     Capture,
@@ -53,6 +54,7 @@ class SceneValues:
     trajectory: Trajectory | None
     renders: Renders | None
     proposal: TargetProposal | None = None
+    gaussians: Gaussians | None = None
 
 
 def load_values(result: SceneResult) -> SceneValues:
@@ -80,6 +82,7 @@ def load_values(result: SceneResult) -> SceneValues:
         _optional(refs.trajectory, Trajectory),
         _optional(refs.renders, Renders),
         _optional(refs.proposal, TargetProposal),
+        _optional(refs.gaussians, Gaussians),
     )
 
 

@@ -14,6 +14,7 @@ from garden_models.reconstruction.dense_stereo import DenseStereo
 from garden_models.reconstruction.depth_consistency import DepthView, agreement
 from garden_models.reconstruction.depth_filter import filter_depth
 from garden_models.reconstruction.depth_scale_check import judge_depth_scale
+from garden_models.reconstruction.fuse_prediction_config import FusePrediction
 from garden_models.reconstruction.fusion import FusedView, footprints, merge_clouds, owned_points
 from garden_models.reconstruction.geometry_model import GeometryPrediction, GeometryView
 from garden_models.reconstruction.photo_geometry import used_photos
@@ -39,24 +40,6 @@ from garden_models.scene import (
     Verdict,
     View,
 )
-
-
-@dataclass(frozen=True)
-class FusePrediction:
-    """``partners`` photos are compared with each photo; a depth is kept where ``min_agreeing``
-    of them (or all, if there are fewer) find the same, by less than ``max_relative`` of it and
-    ``max_disagreement_px`` of parallax. Where less than ``min_confirmed`` of what the model
-    was sure of is kept, the result is degraded.
-    """
-
-    partners: int = 8
-    min_agreeing: int = 2
-    max_relative: float = 0.03
-    max_disagreement_px: float = 3.0
-    min_confidence: float = 0.1
-    min_confirmed: float = 0.3
-    max_points: int = 500_000
-    device: str = "cpu"
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,8 @@ from typing import Any
 import torch
 
 from garden_models.foundation.model_card import ModelCard
+from garden_models.reconstruction.memory_need import WEIGHT_FILES
 from garden_models.scene import BadInput
-
-WEIGHT_FILES = ("model.safetensors", "model.pt")
 
 
 def read_weights(folder: Path) -> dict[str, torch.Tensor]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from garden_models.foundation.failure import ModelOutOfMemory
 from garden_models.progress import Progress, silent
+from garden_models.reconstruction.chunk_limits import ChunkLimits
 from garden_models.reconstruction.chunk_merging import merge_chunks
 from garden_models.reconstruction.geometry_model import (
     GeometryPrediction,
@@ -18,20 +19,6 @@ from garden_models.scene import BadInput, Verdict
 
 FEWEST_BEYOND_OVERLAP = 2
 """New photos that a chunk must hold beside those that it shares."""
-
-
-@dataclass(frozen=True)
-class ChunkLimits:
-    """``gpu_memory_gb`` is what the model may use; neighbouring chunks share ``overlap`` photos."""
-
-    gpu_memory_gb: float = 24.0
-    overlap: int = 8
-
-    def __post_init__(self) -> None:
-        if self.gpu_memory_gb <= 0:
-            raise BadInput(f"gpu_memory_gb is {self.gpu_memory_gb}: state what the GPU has")
-        if self.overlap < 1:
-            raise BadInput(f"overlap is {self.overlap}: chunks must share at least one photo")
 
 
 def predict_long(

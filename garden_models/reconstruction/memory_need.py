@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from garden_models.reconstruction.load_network_class import WEIGHT_FILES
-
+WEIGHT_FILES = ("model.safetensors", "model.pt")
 RUNTIME_GB = 1.0
 """What CUDA and torch's allocator take before anything is computed."""
 USABLE = 0.9

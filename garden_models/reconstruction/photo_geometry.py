@@ -3,43 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from garden_models.progress import Progress, silent
+from garden_models.reconstruction.chunk_limits import ChunkLimits
 from garden_models.reconstruction.gaussian_check import judge_gaussians
 from garden_models.reconstruction.geometry_model import (
     GeometryPrediction,
     GeometryRequest,
     PredictGeometry,
 )
-from garden_models.reconstruction.long_capture import ChunkLimits, predict_long
+from garden_models.reconstruction.long_capture import predict_long
 from garden_models.reconstruction.memory_need import MemoryNeed
+from garden_models.reconstruction.photo_geometry_config import PhotoGeometry
 from garden_models.reconstruction.undistort import undistort
 from garden_models.scene import BadInput, Capture, KnownCamera, Photo
-
-EMBEDDED = "embedded"
-
-
-@dataclass(frozen=True)
-class PhotoGeometry:
-    """Where cameras and depth come from.
-
-    ``method`` is ``embedded`` (structure from motion and stereo: the options of ``register``
-    and ``reconstruct``) or a model's name. A model keeps to ``gpu_memory_gb``; what does not
-    fit is predicted in chunks of which neighbours share ``overlap`` photos. ``gaussians`` and
-    ``camera_tokens`` ask for these too, of a model that has them.
-    """
-
-    method: str = EMBEDDED
-    gpu_memory_gb: float = 24.0
-    overlap: int = 8
-    gaussians: bool = False
-    camera_tokens: bool = False
-
-    def __post_init__(self) -> None:
-        ChunkLimits(self.gpu_memory_gb, self.overlap)
 
 
 def predict_geometry(

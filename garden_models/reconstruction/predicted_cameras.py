@@ -13,7 +13,7 @@ from garden_models.reconstruction.photo_geometry import used_photos
 from garden_models.reconstruction.similarity import Similarity
 from garden_models.reconstruction.sparse_model import assumed_scale
 from garden_models.reconstruction.view_alignment import lift
-from garden_models.scene import BadInput, Camera, Capture, Scale, SparseModel, Verdict
+from garden_models.scene import OK, BadInput, Camera, Capture, Scale, SparseModel, Verdict
 
 MOST_POINTS = 20_000
 PER_VIEW = 400
@@ -51,7 +51,8 @@ def predicted_cameras(capture: Capture, prediction: GeometryPrediction) -> Spars
     samples = _sample(capture, views)
     seen = _seen(views, samples)
     confirmed = seen.sum(axis=1) >= 2
-    verdict = prediction.verdict.worst(_verdict(confirmed, len(views)))
+    doubts = OK if prediction.verdict.status == "ok" else prediction.verdict
+    verdict = doubts.worst(_verdict(confirmed, len(views)))
     points, views_of = samples.world[confirmed], seen[confirmed]
     names = {photo.name for photo, _ in used}
     return SparseModel(

@@ -16,8 +16,9 @@ def down_from_tokens(
     tokens: Float[np.ndarray, "n c"],
     reference: int,
     camera_from_world: Float[np.ndarray, "n r 4"],
-) -> Float[np.ndarray, "3"]:
-    """Return the unit direction down in the world of the backbone's cameras.
+) -> tuple[Float[np.ndarray, "3"], float | None]:
+    """Return the unit direction down in the world of the backbone's cameras, and the error that
+    the network claims (radians, not calibrated; None if it claims none).
 
     The network gives the rotation from the reference view to Gravity-View; with the camera
     rotation of that view, ``gv_from_world = gv_from_reference @ reference_from_world``.
@@ -37,4 +38,5 @@ def down_from_tokens(
             torch.tensor([reference]),
         )
     gv_from_reference = found.rotation[0].numpy().astype(np.float64)
-    return normalized((gv_from_reference @ camera_from_world[reference, :3, :3])[1])
+    claimed = None if found.log_sigma is None else float(found.log_sigma[0].exp())
+    return normalized((gv_from_reference @ camera_from_world[reference, :3, :3])[1]), claimed

@@ -10,10 +10,12 @@ import pytest
 from garden_models.geometry.camera import backproject_depth
 from garden_models.reconstruction import da3_photos
 from garden_models.reconstruction.depth_anything_3 import predict
-from garden_models.reconstruction.fuse_prediction import FusePrediction, fuse_prediction
+from garden_models.reconstruction.fuse_prediction import fuse_prediction
+from garden_models.reconstruction.fuse_prediction_config import FusePrediction
 from garden_models.reconstruction.geometry_model import GeometryPrediction
 from garden_models.reconstruction.memory_need import MemoryNeed
-from garden_models.reconstruction.photo_geometry import PhotoGeometry, predict_geometry, request_of
+from garden_models.reconstruction.photo_geometry import predict_geometry, request_of
+from garden_models.reconstruction.photo_geometry_config import PhotoGeometry
 from garden_models.reconstruction.predicted_cameras import predicted_cameras
 from garden_models.scene import BadGeometry, BadInput, Capture, KnownCamera, Photo
 from tests.doubles import depth_anything_3 as double

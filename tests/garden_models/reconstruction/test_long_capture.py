@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from garden_models.foundation.failure import ModelOutOfMemory
 from garden_models.geometry.rotation import axis_angle
+from garden_models.reconstruction.chunk_limits import ChunkLimits
 from garden_models.reconstruction.chunk_merging import merge_chunks
 from garden_models.reconstruction.geometry_model import (
     CameraTokens,
@@ -20,7 +21,7 @@ from garden_models.reconstruction.geometry_model import (
     GeometryRequest,
     GeometryView,
 )
-from garden_models.reconstruction.long_capture import ChunkLimits, part_of, predict_long
+from garden_models.reconstruction.long_capture import part_of, predict_long
 from garden_models.reconstruction.memory_need import RUNTIME_GB, MemoryNeed
 from garden_models.reconstruction.photo_chunks import owners, photo_chunks
 from garden_models.reconstruction.similarity import Similarity

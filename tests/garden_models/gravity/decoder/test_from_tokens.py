@@ -28,12 +28,14 @@ def test_another_world_turns_the_answer(known):
     rng = np.random.default_rng(0)
     tokens = rng.normal(size=(4, 6))
     cameras = np.stack([np.c_[axis_angle(rng.normal(size=3), 1.0), np.zeros(3)] for _ in range(4)])
-    down = down_from_tokens(known, tokens, 2, cameras)
+    down, claimed = down_from_tokens(known, tokens, 2, cameras)
+    assert claimed is None or claimed > 0
     assert np.linalg.norm(down) == pytest.approx(1)
     turn = axis_angle(np.array([1.0, 2, 3]), 0.9)
     turned = cameras.copy()
     turned[:, :, :3] = cameras[:, :, :3] @ turn.T
-    np.testing.assert_allclose(down_from_tokens(known, tokens, 2, turned), turn @ down, atol=1e-9)
+    again, _ = down_from_tokens(known, tokens, 2, turned)
+    np.testing.assert_allclose(again, turn @ down, atol=1e-9)
 
 
 def test_what_does_not_go_together_is_refused(known):
