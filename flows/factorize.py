@@ -10,8 +10,8 @@ from flows.scene_geometry import (
     background_gaussians,
     by_model,
     fused_prediction,
-    prediction_and_cameras,
     predicted_gravity,
+    prediction_and_cameras,
 )
 from flows.target_proposal import look_for_targets, targets_of
 from garden_models.scene import Rivals, Target
