@@ -13,7 +13,7 @@ from flows.scene_geometry import (
     predicted_gravity,
     prediction_and_cameras,
 )
-from flows.target_proposal import look_for_targets, targets_of
+from flows.target_proposal import looking_for_targets, targets_of, without_proposal
 from garden_models.scene import Rivals, Target
 from tasks.align_gravity import align_gravity
 from tasks.clean_background import clean_background
@@ -79,15 +79,17 @@ def factorize_scene(
         refs.cameras = register(refs.capture, preset.register)
     if refs.cameras.failed:
         raise StepFailed(refs.cameras.step, "", "; ".join(refs.cameras.reasons), kind="BadGeometry")
-    looking = None if targets else look_for_targets(refs.capture, refs.cameras, preset)
-    if refs.prediction is not None:
-        refs.reconstruction = fused_prediction(refs.capture, refs.cameras, refs.prediction, preset)
-        refs.gravity_view = predicted_gravity(refs.reconstruction, refs.prediction, preset)
-    else:
-        refs.reconstruction = reconstruct(refs.capture, refs.cameras, preset.reconstruct)
-        refs.gravity_view = align_gravity(refs.reconstruction, preset.gravity)
-    if looking is not None:
-        refs.proposal = looking.result()
+    wanted = without_proposal(preset) if targets else preset
+    with looking_for_targets(refs.capture, refs.cameras, wanted) as proposal:
+        if refs.prediction is not None:
+            found = fused_prediction(refs.capture, refs.cameras, refs.prediction, preset)
+            refs.reconstruction = found
+            refs.gravity_view = predicted_gravity(found, refs.prediction, preset)
+        else:
+            refs.reconstruction = reconstruct(refs.capture, refs.cameras, preset.reconstruct)
+            refs.gravity_view = align_gravity(refs.reconstruction, preset.gravity)
+        refs.proposal = proposal()
+    if refs.proposal is not None:
         targets, refs.targets = targets_of(refs.proposal)
     factor = partial(factor_object, refs=refs, preset=preset)
     outcomes = list(zip(targets, fan_out(factor, targets), strict=True))

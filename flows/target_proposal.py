@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from concurrent.futures import Future
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, wait
+from contextlib import contextmanager
 from typing import Any, cast
 
 from flows.preset import Preset
 from garden_models.scene import BadInput, SparseModel, Target
-from garden_models.targets.config import check_grounding, check_proposing
+from garden_models.targets.config import ProposeTargets, check_grounding, check_proposing
 from garden_models.targets.proposal import TargetProposal
 from tasks.ground_targets import ground_targets
 from tasks.model.weights import weight_files
@@ -55,19 +57,42 @@ def without_proposal(preset: Preset) -> Preset:
     )
 
 
-def look_for_targets(capture: Ref, cameras: Ref, preset: Preset) -> Future[Ref] | None:
-    """Start looking for targets in the registered photos; None if nobody is asked."""
-    if not proposes(preset):
-        return None
-    leave_out: Any = cameras
-    if not cameras.pending:
-        leave_out = load(cameras, SparseModel, fields=("unregistered",))["unregistered"]
+@contextmanager
+def looking_for_targets(
+    capture: Ref, cameras: Ref, preset: Preset
+) -> Iterator[Callable[[], Ref | None]]:
+    """Look for targets in the registered photos while what stands inside goes on.
+
+    Gives what waits for the proposal; it gives None if nobody is asked. A language model is
+    asked at once, its server computes; a detector only when it is waited for, since it takes
+    this machine. An answer that is on its way is kept also if what goes on fails.
+    """
     if preset.ground.model:
-        return ground_targets.submit(capture, leave_out, preset.ground)
-    proposal = propose_targets.submit(capture, leave_out, preset.propose)
-    if not preset.propose.critic:
+        yield lambda: ground_targets(capture, _unregistered(cameras), preset.ground)
+        return
+    if not preset.propose.model:
+        yield lambda: None
+        return
+    asked = _ask(capture, _unregistered(cameras), preset.propose)
+    try:
+        yield asked.result
+    except Exception:
+        wait([asked])
+        raise
+
+
+def _ask(capture: Ref, leave_out: Any, config: ProposeTargets) -> Future[Ref]:
+    proposal = propose_targets.submit(capture, leave_out, config)
+    if not config.critic:
         return proposal
-    return check_targets.submit(capture, leave_out, proposal, preset.propose)
+    return check_targets.submit(capture, leave_out, proposal, config)
+
+
+def _unregistered(cameras: Ref) -> Any:
+    """Return the photos not to look at; in a plan that does not know them, what tells them."""
+    if cameras.pending:
+        return cameras
+    return load(cameras, SparseModel, fields=("unregistered",))["unregistered"]
 
 
 def targets_of(proposal: Ref) -> tuple[tuple[Target, ...], tuple[Target, ...]]:

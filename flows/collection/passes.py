@@ -18,6 +18,7 @@ STEP_OF = {
     "geometry": "predict_geometry",
     "reconstruct": "reconstruct",
     "gravity": "align_gravity",
+    "ground": "ground_targets",
     "segment": "segment",
     "mesh": "mesh_object",
     "place": "place_object",

@@ -33,5 +33,15 @@ class GroundingAnswer:
     scores: Float[np.ndarray, " k"]
     label: Int[np.ndarray, " k"]
 
+    def fits(self, request: GroundingRequest) -> str:
+        """Return what is wrong with it as an answer to a request, empty if nothing is."""
+        if ((self.label < 0) | (self.label >= len(request.labels))).any():
+            return f"a label is none of the {len(request.labels)} that were asked for"
+        if ((self.scores < 0) | (self.scores > 1)).any():
+            return "a score is not between 0 and 1"
+        if (self.boxes[:, :2] > self.boxes[:, 2:]).any():
+            return "a box ends before it begins"
+        return ""
+
 
 GroundLabels = Callable[[GroundingRequest], GroundingAnswer]

@@ -17,9 +17,10 @@ from flows.preset import Preset
 from flows.report.document import scene_verdict
 from flows.scene_request import SceneOptions, read_scene
 from flows.scene_run import SceneRequest, SceneResult, is_finished, plan_scene, run_scene
-from garden_models.scene import Target
+from garden_models.scene import BadGeometry, Target
 from garden_models.targets.config import ProposeTargets
 from storage import Store
+from tasks.reconstruct import reconstruct
 from tests.faults.stand_in import all_steps, sample_of
 from tests.flows.benchmark.latency.filled_store import capture
 from tests.vlm_server import KEY, KEY_VARIABLE, Reply, VlmServer, targets_json
@@ -134,6 +135,29 @@ def test_a_proposal_that_fails_is_one_sentence_and_costs_no_other_step(
     assert did["cached"] >= set(BEFORE)
     assert not did["executed"] & set(BEFORE)
     assert ("propose_targets" in did["cached"]) == (replies[0] == GOOD)
+
+
+def test_an_answer_on_its_way_is_kept_when_something_else_fails(
+    photos: Path,
+    vlm: VlmServer,
+    vlm_config: ProposeTargets,
+    store: Store,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(**_arguments: Any) -> Any:
+        raise BadGeometry("the photos show nothing")
+
+    fail.__module__ = reconstruct.fn.__module__
+    vlm.say(Reply(GOOD, delay_s=0.3), Reply(GOOD, delay_s=0.3))
+    with monkeypatch.context() as patch:
+        patch.setattr(reconstruct, "fn", fail)
+        result, did = run(request(photos, vlm_config), store)
+    assert result.refs.failure is not None
+    assert result.refs.failure.step == "reconstruct"
+    assert did["executed"] >= set(PROPOSING)
+    _result, did = run(request(photos, vlm_config), store)
+    assert did["cached"] >= set(PROPOSING)
+    assert len(vlm.asked) == 2
 
 
 def test_another_goal_that_fails_takes_nothing_from_what_was_there(

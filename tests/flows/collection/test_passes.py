@@ -142,6 +142,7 @@ class Options:
 class Chosen:
     reconstruct: Options = field(default_factory=Options)
     gravity: Options = field(default_factory=Options)
+    ground: Options = field(default_factory=Options)
     segment: Options = field(default_factory=Options)
     mesh: Options = field(default_factory=Options)
     place: Options = field(default_factory=Options)
@@ -162,6 +163,10 @@ class Chosen:
             ),
             ("align_gravity", "place_object"),
         ),
+        (
+            Chosen(reconstruct=Options("doubler"), ground=Options("tripler")),
+            ("ground_targets",),
+        ),
     ],
 )
 def test_a_scene_stops_where_its_model_changes(
@@ -173,12 +178,12 @@ def test_a_scene_stops_where_its_model_changes(
 
 
 def test_every_option_of_a_preset_that_can_name_a_model_has_its_step() -> None:
-    from flows import factorize
+    from flows import factorize, target_proposal
     from flows.preset import Preset
 
     for option, step in passes.STEP_OF.items():
         assert hasattr(Preset(), option)
-        assert hasattr(factorize, step)
+        assert hasattr(factorize, step) or hasattr(target_proposal, step)
 
 
 def test_passes_come_in_order_within_a_wave() -> None:
