@@ -35,6 +35,10 @@ class Answers:
             while data:
                 data = data[os.write(self._descriptor, data) :]
 
+    def waiting(self, waits: bool) -> None:
+        """Tell that the work begins, or ends, to wait for others."""
+        self.send({"waiting": waits})
+
     def progress(self, share: float, doing: str) -> None:
         """Tell how far the work is."""
         self.send({"progress": [float(share), doing]})

@@ -8,6 +8,7 @@ import select
 import socket
 import threading
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from tasks.model.worker import Report
 from tasks.model.worker_error import raised_in_worker
 from tasks.model_worker import protocol
 from tasks.step.ref import Cancelled
+from tasks.step.waiting import waiting
 
 VARIABLE = "GARDEN_KEEPER"
 OFF = "off"
@@ -86,18 +88,21 @@ class KeeperClient:
     def _expect(
         self, word: str, name: str, report: Report, stopped: Callable[[], bool] = lambda: False
     ) -> dict[str, Any]:
-        while True:
-            for message in self._messages():
-                if protocol.PROGRESS in message:
-                    report(*message[protocol.PROGRESS])
-                elif protocol.ERROR in message:
-                    raise raised_in_worker(name, message[protocol.ERROR])
-                else:
-                    found: dict[str, Any] = message[word]
-                    return found
-            if stopped():
-                self.close()
-                raise Cancelled("the run was stopped")
+        with ExitStack() as its_turn:
+            its_turn.enter_context(waiting())
+            while True:
+                for message in self._messages():
+                    its_turn.close()
+                    if protocol.PROGRESS in message:
+                        report(*message[protocol.PROGRESS])
+                    elif protocol.ERROR in message:
+                        raise raised_in_worker(name, message[protocol.ERROR])
+                    else:
+                        found: dict[str, Any] = message[word]
+                        return found
+                if stopped():
+                    self.close()
+                    raise Cancelled("the run was stopped")
 
     def _messages(self) -> list[dict[str, Any]]:
         ready, _, _ = select.select([self._socket], [], [], _POLL_S)

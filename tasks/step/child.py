@@ -41,7 +41,7 @@ def obey(order: dict[str, Any], answers: Answers) -> dict[str, Any]:
     store = open_store(order)
     context = RunContext(store, order["scene"], run_id=order["run_id"], isolate=False)
     with run_context(context):
-        done = compute(context, step, arguments, answers.progress)
+        done = compute(context, step, arguments, answers.progress, answers.waiting)
     return dataclasses.asdict(done)
 
 

@@ -42,6 +42,8 @@ class ChildProcess:
     weigh_at: float = 0.0  # when its memory is looked at next
     buffer: bytes = b""
     silent: bool = False  # it has closed its end of the pipe
+    waited_s: float = 0.0  # for others, up to now
+    waits_since: float | None = None
 
     def messages(self, wait_s: float) -> Iterator[dict[str, Any]]:
         """Give what the child says; wait for it no longer than ``wait_s``.
@@ -60,6 +62,19 @@ class ChildProcess:
             raise Garbled(f"a line of more than {_LONGEST_LINE >> 20} MB")
         for line in lines:
             yield _message(line)
+
+    def waits(self, begins: bool) -> None:
+        """Note that the child begins, or ends, to wait for others."""
+        now = time.monotonic()
+        if self.waits_since is not None:
+            self.waited_s += now - self.waits_since
+        self.waits_since = now if begins else None
+
+    def busy_s(self) -> float:
+        """Return the seconds since its start in which it did not wait for others."""
+        now = time.monotonic()
+        waiting = 0.0 if self.waits_since is None else now - self.waits_since
+        return now - self.started - self.waited_s - waiting
 
     def weigh(self) -> None:
         """Look at the memory of the child and all that it started, not too often."""

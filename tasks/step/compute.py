@@ -18,6 +18,7 @@ from tasks.step.memory import peak_memory
 from tasks.step.ref import Cancelled, Seconds
 from tasks.step.run import RunContext
 from tasks.step.seed import seed_everything
+from tasks.step.waiting import counted_waits, tell_nobody
 
 if TYPE_CHECKING:
     from tasks.step import Step
@@ -40,9 +41,10 @@ def compute(
     step: Step,
     arguments: Arguments,
     report: Callable[[float, str], None],
+    tell_waiting: Callable[[bool], None] = tell_nobody,
 ) -> Done:
     """Run the step's function on the values of its inputs and publish what it returns."""
-    with peak_memory() as peak:
+    with peak_memory() as peak, counted_waits(tell_waiting) as waits:
         started = time.monotonic()
         values = load_inputs(context, arguments, step.hints())
         loaded = time.monotonic()
@@ -55,7 +57,8 @@ def compute(
         del values
         published = context.store.publish(result)
         stored = time.monotonic()
-    seconds = Seconds(loaded - started, computed - loaded, stored - computed)
+    computing = computed - loaded - waits.seconds
+    seconds = Seconds(loaded - started, computing, stored - computed, waits.seconds)
     return Done(published, verdict_of(result), seconds, peak.mb)
 
 

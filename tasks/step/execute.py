@@ -191,6 +191,7 @@ def _make(call: Call, parts: KeyParts, why: Why, waited: float, gpus: tuple[str,
     context.emit(_event(call, "started", why=why))
     started = time.time()
     done, attempt = _with_retries(call, gpus)
+    waited += done.seconds.wait
     published = done.published
     recording = time.monotonic()
     record = ActionRecord(

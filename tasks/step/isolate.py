@@ -11,7 +11,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -114,6 +113,8 @@ def _listen(
         for message in child.messages(_POLL_S):
             if "progress" in message:
                 report(*message["progress"])
+            elif "waiting" in message:
+                child.waits(message["waiting"])
             else:
                 return message
         if child.silent:
@@ -125,7 +126,7 @@ def _check_limits(context: RunContext, step: Step, child: ChildProcess) -> None:
     if context.cancelled.is_set():
         raise Cancelled("the run was stopped")
     limit_s, limit_gb = step.spec.time_limit_s, step.spec.memory_limit_gb
-    if limit_s is not None and time.monotonic() - child.started > limit_s:
+    if limit_s is not None and child.busy_s() > limit_s:
         raise TimeLimit(
             f"stopped after {limit_s:g} s, its time limit: use fewer or smaller photos,"
             " or raise the limit"

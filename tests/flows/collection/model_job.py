@@ -9,18 +9,16 @@ from typing import Any
 import numpy as np
 
 from flows.collection.job import JobOrder, JobRun, Report
-from garden_models import foundation
 from garden_models.scene import BadInput
 from storage import Store
 from tasks.model import predictor, weights_of
 from tasks.step import Postponed, Ref, RunContext, fan_out, run_context, step
 from tests.tasks.model.nouns import Answer, Question
+from tests.tasks.model.registered import MODELS, register_if_told
 
-MODELS = ("doubler", "tripler")
 STOPS = ("triple",)
 
-for _name in MODELS:  # the workers of a batch import this file
-    foundation.ADAPTERS.setdefault(_name, f"tests.tasks.model.{_name}")
+register_if_told()
 
 
 def _note(log: str, what: str) -> None:
@@ -112,7 +110,7 @@ def orders(home: Path, stops: tuple[str, ...] = STOPS, **does: str) -> list[JobO
             name,
             "tests.flows.collection.model_job:model_job",
             {"name": name, "number": number, "log": str(home / "ran.log"), "does": what},
-            models=MODELS,
+            models=tuple(MODELS),
             stops=stops,
         )
         for number, (name, what) in enumerate(does.items())

@@ -16,11 +16,11 @@ from flows.collection.passes import postponed, priority, stops_of
 from flows.collection.row import SceneRow
 from flows.collection.state import CollectionState, read_state
 from flows.command.status import _lines
-from garden_models import foundation
 from storage import Store
 from tests.flows.collection.model_job import STOPS, orders
 from tests.flows.collection.test_run import batch, rows_of
 from tests.tasks.model.doubler import loads, put_weights
+from tests.tasks.model.registered import register_for
 
 SCENES = dict.fromkeys("abcdef", "")
 
@@ -28,6 +28,7 @@ SCENES = dict.fromkeys("abcdef", "")
 @pytest.fixture
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     Store.open(tmp_path / "store")
+    register_for(monkeypatch)
     monkeypatch.setenv("GARDEN_WEIGHTS", str(tmp_path / "weights"))
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
@@ -170,10 +171,8 @@ class Chosen:
     ],
 )
 def test_a_scene_stops_where_its_model_changes(
-    home: Path, monkeypatch: pytest.MonkeyPatch, chosen: Chosen, stops: tuple[str, ...]
+    home: Path, chosen: Chosen, stops: tuple[str, ...]
 ) -> None:
-    for name in ("doubler", "tripler"):
-        monkeypatch.setitem(foundation.ADAPTERS, name, f"tests.tasks.model.{name}")
     assert stops_of(chosen) == stops  # type: ignore[arg-type]
 
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from garden_models import foundation
 from storage import Store
 from tasks.model.resident import residents
 from tests.tasks.model.doubler import put_weights
+from tests.tasks.model.registered import MODELS, register_for
 
 
 @pytest.fixture
@@ -18,8 +18,8 @@ def store(tmp_path: Path) -> Store:
 @pytest.fixture
 def models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Register the test models, with weights in a folder of their own; give that folder."""
-    for name in ("doubler", "tripler"):
-        monkeypatch.setitem(foundation.ADAPTERS, name, f"tests.tasks.model.{name}")
+    register_for(monkeypatch)
+    for name in MODELS:
         put_weights(tmp_path / "weights" / name, 2.0 if name == "doubler" else 3.0)
     monkeypatch.setenv("GARDEN_WEIGHTS", str(tmp_path / "weights"))
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))

@@ -14,6 +14,8 @@ import numpy as np
 from garden_models.scene import BadInput
 from tests.tasks.model.nouns import Answer, Part, Question
 
+SLOW_S = 8.0
+
 
 def _die(_question: Question) -> None:
     print("the driver gave up")
@@ -29,6 +31,11 @@ def _leave(_question: Question) -> None:
 
 def _hang(_question: Question) -> None:
     time.sleep(600)
+
+
+def _slow(question: Question) -> Answer:
+    time.sleep(SLOW_S)
+    return Answer(question.values, 0.0)
 
 
 def _hoard(_question: Question) -> None:
@@ -105,6 +112,7 @@ HOW: dict[str, Callable[[Question], Any]] = {
     "die": _die,
     "leave": _leave,
     "hang": _hang,
+    "slow": _slow,
     "hoard": _hoard,
     "bad": _refuse,
     "memory": _fill,

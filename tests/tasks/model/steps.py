@@ -10,6 +10,9 @@ from garden_models.scene import Target
 from tasks.model import backend_of, predictor, weights_of
 from tasks.step import step
 from tests.tasks.model.nouns import Answer, Question
+from tests.tasks.model.registered import register_if_told
+
+register_if_told()
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ def ask(target: Target, config: Asking) -> Answer:
     return _ask(target, config)
 
 
-@step(version=1, backend=_backend, weights=_weights, isolated=True, retries=0)
+@step(version=1, backend=_backend, weights=_weights, isolated=True, retries=0, time_limit_s=6)
 def ask_apart(target: Target, config: Asking) -> Answer:
     return _ask(target, config)
 

@@ -23,10 +23,11 @@ from tasks.model import predictor
 from tasks.model.keeper_client import KeeperClient, keeper_address
 from tasks.model.keeper_process import Costs, model_keeper
 from tasks.model.resident import residents
-from tasks.step import RunContext, StepFailed, run_context
+from tasks.step import RunContext, Step, StepFailed, run_context
 from tests.tasks.model.doubler import loads
+from tests.tasks.model.misbehave import SLOW_S
 from tests.tasks.model.nouns import Question
-from tests.tasks.model.steps import TARGETS, Asking, ask
+from tests.tasks.model.steps import TARGETS, Asking, ask, ask_apart
 from tests.tasks.model.test_worker import settings
 from tests.tasks.step.test_isolate import alive, wait_for
 
@@ -54,23 +55,25 @@ def test_it_answers_as_in_this_process(models: Path) -> None:
 
 
 CLIENT = """
+import os
 import sys
 import numpy as np
-from garden_models import foundation
-for name in ("doubler", "tripler"):
-    foundation.ADAPTERS[name] = f"tests.tasks.model.{name}"
 from tasks.model import predictor
+from tests.tasks.model.misbehave import SLOW_S
 from tests.tasks.model.nouns import Question
+from tests.tasks.model.registered import register_if_told
+register_if_told()
 for name in sys.argv[1:]:
     with predictor(name) as predict:
-        print(predict(Question(np.ones((1, 2)))).values[0, 0], flush=True)
+        question = Question(np.ones((1, 2)), os.environ.get("HOW", ""))
+        print(predict(question).values[0, 0], flush=True)
 """
 
 
-def client(*words: str) -> subprocess.Popen[bytes]:
+def client(*words: str, how: str = "") -> subprocess.Popen[bytes]:
     return subprocess.Popen(
         [sys.executable, "-c", CLIENT, *words],
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "HOW": how},
         stdout=subprocess.PIPE,
     )
 
@@ -137,11 +140,7 @@ def test_errors_come_back_typed_and_cost_one_question(
 
 
 def test_a_client_that_is_killed_lets_the_others_go_on(models: Path, keeper: Costs) -> None:
-    code = CLIENT.replace("np.ones((1, 2))", "np.ones((1, 2)), 'hang'")
-    hanging = subprocess.Popen(
-        [sys.executable, "-c", code, "doubler"],
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
-    )
+    hanging = client("doubler", how="hang")
     wait_for(lambda: loads(models / "doubler") == 1)
     hanging.send_signal(signal.SIGKILL)
     hanging.wait()
@@ -186,14 +185,31 @@ def test_a_keeper_that_is_gone_is_told(models: Path, tmp_path: Path, monkeypatch
         raise AssertionError
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [ask, ask_apart])
+def test_time_in_the_queue_is_waiting_and_does_not_count_towards_a_limit(
+    models: Path, keeper: Costs, store: Store, step: Step
+) -> None:
+    """Somebody else's question is answered first, which takes longer than the step may."""
+    first = client("doubler", how="slow")
+    wait_for(lambda: loads(models / "doubler") == 1)
+    with run_context(RunContext(store, "room")):
+        ref = step(TARGETS[0], Asking(others="tripler"))
+    assert ref.seconds.wait > 1.0
+    assert store.action(ref.key).seconds["wait"] == ref.seconds.wait
+    assert first.wait(60) == 0
+    assert step is ask or step.spec.time_limit_s < SLOW_S
+
+
 PARENT = """
 import sys
 import numpy as np
-from garden_models import foundation
-foundation.ADAPTERS["doubler"] = "tests.tasks.model.doubler"
 from tasks.model import predictor
 from tasks.model.keeper_process import model_keeper
+from tests.tasks.model.misbehave import SLOW_S
 from tests.tasks.model.nouns import Question
+from tests.tasks.model.registered import register_if_told
+register_if_told()
 with model_keeper(), predictor("doubler") as predict:
     print(int(predict(Question(np.ones((1, 2)), "pid")).noise), flush=True)
     predict(Question(np.ones((1, 2)), "hang"))

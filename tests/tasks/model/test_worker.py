@@ -216,10 +216,10 @@ def test_its_memory_is_given_back_when_another_model_is_asked(apart: Path) -> No
 PARENT = """
 import sys
 import numpy as np
-from garden_models import foundation
-foundation.ADAPTERS["doubler"] = "tests.tasks.model.doubler"
 from tasks.model import predictor
 from tests.tasks.model.nouns import Question
+from tests.tasks.model.registered import register_if_told
+register_if_told()
 with predictor("doubler") as predict:
     print(int(predict(Question(np.ones((1, 2)), "pid")).noise), flush=True)
     predict(Question(np.ones((1, 2)), "hang"))
