@@ -53,10 +53,14 @@ class Reach:
 
 
 def counts(module: str) -> bool:
-    """Tell whether a module can change a result: the step shell and the store only keep it."""
+    """Tell whether a module can change a result: the step shell and the store only keep it, and
+    what runs models, with their registry, is counted with the model that a step names.
+    """
     package, _, rest = module.partition(".")
+    if module == "garden_models.foundation":
+        return False
     if package == "tasks":
-        return not rest.startswith("step")
+        return rest.partition(".")[0] not in ("step", "model", "model_worker")
     return package == "garden_models" or rest.startswith("formats")
 
 
