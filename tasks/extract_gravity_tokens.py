@@ -25,7 +25,7 @@ def _weights(backbone: str, dataset: str, root: str, **_others: object) -> dict[
 
 @step(
     version=1,
-    packages=("torch", "numpy", "opencv-python-headless"),
+    packages=("torch", "numpy", "opencv-python-headless", "safetensors", "scipy"),
     weights=_weights,
     skip=("root", "backbone", "device"),
     isolated=True,

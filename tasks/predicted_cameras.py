@@ -11,7 +11,7 @@ from garden_models.scene import Capture, SparseModel
 from tasks.step import step
 
 
-@step(version=1, packages=("numpy", "opencv-python-headless"), memory_gb=2.0)
+@step(version=1, packages=("numpy", "opencv-python-headless", "pycolmap"), memory_gb=2.0)
 def predicted_cameras(
     capture: Capture, prediction: GeometryPrediction, progress: Progress = silent
 ) -> SparseModel:

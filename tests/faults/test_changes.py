@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flows import factorize
+from flows import factorize, scene_geometry
 from tasks.step import Step
 from tests.faults.copied_packages import (
     ROOT,
@@ -31,6 +31,7 @@ from tests.faults.stand_in import all_steps
 
 STEPS = all_steps()
 OF_A_SCENE = {step.name for step in vars(factorize).values() if isinstance(step, Step)}
+BY_A_MODEL = {step.name for step in vars(scene_geometry).values() if isinstance(step, Step)}
 MUG, JAR = "mug a.png 5 5 40 40", "jar a.png 30 30 70 50"
 BOXES = ("--box", *MUG.split(), "--box", *JAR.split())
 
@@ -209,7 +210,7 @@ def test_a_library_that_a_step_reaches_counts_by_its_version(
     # Annotations, and a hash by which weights are found.
     no_result = set(sys.stdlib_module_names) | {"jaxtyping", "blake3"}
     missing = {}
-    for name in OF_A_SCENE:
+    for name in OF_A_SCENE | BY_A_MODEL:
         declared = {normal(package) for package in STEPS[name].spec.packages}
         libraries = graph.libraries(reach[name]) - no_result - NOT_CALLED.get(name, set())
         left = {n for n in libraries if not declared & {normal(o) for o in owners.get(n, [n])}}
