@@ -28,6 +28,7 @@ class Reply:
     """What to give: a model's text, or (with ``body``) these very bytes.
 
     ``delay_s`` passes before; ``hang_up`` closes the connection in the place of an answer.
+    ``finish`` is why it ended, in the API's words; ``cut`` becomes these.
     """
 
     text: str = ""
@@ -121,12 +122,14 @@ def targets_json(*entries: tuple[str, str, list[float]], key: str = "box_2d", **
 def _body(reply: Reply, asked: Asked) -> bytes:
     if reply.body is not None:
         return reply.body
+    google = {"": "STOP", "cut": "MAX_TOKENS"}.get(reply.finish, reply.finish)
+    others = {"": "stop", "cut": "length"}.get(reply.finish, reply.finish)
     if "generateContent" in asked.path:
         thought = {"text": '{"targets": "a thought"}', "thought": True}
         parts = [thought, {"text": reply.text}] if reply.text else []
         document = {
             "candidates": [
-                {"content": {"parts": parts}, "finishReason": reply.finish or "STOP"}
+                {"content": {"parts": parts}, "finishReason": google}
             ],
             "usageMetadata": {
                 "promptTokenCount": 1200, "candidatesTokenCount": 80, "thoughtsTokenCount": 20,
@@ -138,7 +141,7 @@ def _body(reply: Reply, asked: Asked) -> bytes:
             "model": LOCAL_MODEL,
             "choices": [
                 {"message": {"role": "assistant", "content": reply.text},
-                 "finish_reason": reply.finish or "stop"}
+                 "finish_reason": others}
             ],
             "usage": {"prompt_tokens": 1200, "completion_tokens": 100},
         }  # fmt: skip

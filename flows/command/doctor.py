@@ -18,6 +18,7 @@ from storage.address import find_medium, is_remote
 from storage.store import MARKER
 from tasks.model.found import FoundModel, found_model
 from tasks.model.settings import settings_file
+from tasks.vlm.server import GEMINI_KEYS, OPENAI_KEY
 
 PACKAGES = (
     "torch", "prefect", "fastapi", "zarr", "pyarrow", "pycolmap", "mujoco", "trimesh",
@@ -36,7 +37,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit code."""
-    findings = [*_packages(), _cores(), _memory(), _store(options), _gpu()]
+    findings = [*_packages(), _cores(), _memory(), _store(options), _gpu(), _keys()]
     broken = [f for f in findings if f["state"] == "missing"]
     models = [found_model(name) for name in ADAPTERS]
     if options.json:
@@ -128,6 +129,15 @@ def _disk(folder: Path) -> dict[str, str]:
     free = shutil.disk_usage(existing).free / 1e9
     enough = free >= NEEDED_GB_DISK
     return _finding("store", "ok" if enough else "low", f"{folder}, {free:.0f} GB free")
+
+
+def _keys() -> dict[str, str]:
+    """Tell which keys to models that propose targets there are, by their variables' names."""
+    known = (*GEMINI_KEYS, OPENAI_KEY)
+    found = [name for name in known if os.environ.get(name, "").strip()]
+    if found:
+        return _finding("keys for --propose", "ok", f"{' and '.join(found)} set")
+    return _finding("keys for --propose", "none", f"none of {', '.join(known)} is set")
 
 
 def _gpu() -> dict[str, str]:

@@ -35,7 +35,9 @@ def package_files(values: SceneValues) -> tuple[dict[str, bytes], Json]:
         "timings.parquet": timings_parquet(document),
         "targets.json": dump_json(_targets(values)),
         "LICENSES.json": dump_json(
-            licences_document(step["backend"] or "" for step in document["steps"])
+            licences_document(
+                (step["backend"] or "" for step in document["steps"]), _services(document)
+            )
         ),
     }
     if values.reconstruction is not None:
@@ -48,6 +50,12 @@ def package_files(values: SceneValues) -> tuple[dict[str, bytes], Json]:
         files |= mujoco_files(values.scene, values.trajectory)
         files["scene.glb"] = _glb(values.scene, values.background)
     return files, document
+
+
+def _services(document: Json) -> list[str]:
+    """Return the models that were asked over a network."""
+    proposal = document["proposal"]
+    return sorted({query["model"] for query in proposal["queries"]}) if proposal else []
 
 
 def dump_json(value: Any) -> bytes:

@@ -23,11 +23,12 @@ COMPONENTS = {
 }
 
 
-def licences_document(backends: Iterable[str] = ()) -> dict[str, Any]:
+def licences_document(backends: Iterable[str] = (), services: Iterable[str] = ()) -> dict[str, Any]:
     """Return the components of a package with version, licence and use.
 
     ``backends`` are those of its steps, ``model`` or ``model/variant``; what is no model with
     a card of its own is GARDEN's code. Commercial use is allowed if every model allows it.
+    ``services`` are models that were asked over a network.
     """
     models = [_model(*found) for found in sorted({_named(b) for b in backends}) if found[0]]
     return {
@@ -38,6 +39,10 @@ def licences_document(backends: Iterable[str] = ()) -> dict[str, Any]:
             for name, (licence, used_by) in COMPONENTS.items()
         ],
         "models": models,
+        "services": [
+            {"name": name, "used_by": "targets", "note": "asked over HTTP under its server's terms"}
+            for name in services
+        ],
         "note": "The photos' own rights stay with whoever holds them.",
     }
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from garden_models.scene import BadInput, Target
 from garden_models.targets.answer_json import Entry, find_entries
 from garden_models.targets.box_convention import BoxConvention
-from garden_models.targets.box_repair import Unusable, read_box
+from garden_models.targets.box_repair import OutsidePhoto, Unusable, read_box
 from garden_models.targets.boxes import check_name
 from garden_models.targets.shown_photos import ShownPhoto
 
@@ -53,19 +53,40 @@ def read_answer(text: str, photos: Sequence[ShownPhoto], convention: BoxConventi
     Raises BadInput if there is no list of boxes in it.
     """
     found = find_entries(text)
-    targets, dropped = [], []
-    for entry in found.entries:
-        said = _text(entry, NAME_KEYS)
-        try:
-            targets.append(_target(entry, said, photos, convention))
-        except Unusable as error:
-            dropped.append(f"{said[:LONGEST_NAME] or 'an entry without a name'}: {error}")
+    targets, dropped, outside = _targets(found.entries, photos, convention, turned=False)
+    if outside and convention.startswith("xyxy_px"):
+        other = _targets(found.entries, photos, convention, turned=True)
+        if not other[2]:
+            targets, dropped = other[:2]
+            found.notes.append(
+                "the boxes only fit their photos with across and down in the place of each other, "
+                "and were read so"
+            )
     removed = tuple(
         (_text(entry, NAME_KEYS), _text(entry, WHY_KEYS))
         for entry in found.removed
         if _text(entry, NAME_KEYS)
     )
     return Answer(tuple(targets), removed, tuple(dropped), tuple(found.notes))
+
+
+def _targets(
+    entries: Sequence[Entry],
+    photos: Sequence[ShownPhoto],
+    convention: BoxConvention,
+    *,
+    turned: bool,
+) -> tuple[list[AnsweredTarget], list[str], int]:
+    """Return the targets, what was dropped and why, and how many boxes lay outside."""
+    targets, dropped, outside = [], [], 0
+    for entry in entries:
+        said = _text(entry, NAME_KEYS)
+        try:
+            targets.append(_target(entry, said, photos, convention, turned=turned))
+        except Unusable as error:
+            dropped.append(f"{said[:LONGEST_NAME] or 'an entry without a name'}: {error}")
+            outside += isinstance(error, OutsidePhoto)
+    return targets, dropped, outside
 
 
 def clean_name(said: str) -> str:
@@ -81,10 +102,15 @@ def clean_name(said: str) -> str:
 
 
 def _target(
-    entry: Entry, said: str, photos: Sequence[ShownPhoto], convention: BoxConvention
+    entry: Entry,
+    said: str,
+    photos: Sequence[ShownPhoto],
+    convention: BoxConvention,
+    *,
+    turned: bool,
 ) -> AnsweredTarget:
     photo = _photo(entry, photos)
-    box, mended = read_box(entry, convention, photo.size, photo.original)
+    box, mended = read_box(entry, convention, photo.size, photo.original, turned=turned)
     name = clean_name(said)
     if name != re.sub(r"\s+", "_", said.strip()):
         mended.append(f"its name was {said[:LONGEST_NAME]!r}" if said else "it had no name")

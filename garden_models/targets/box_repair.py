@@ -30,14 +30,21 @@ class Unusable(ValueError):
     """A box, or an entry, that cannot be mended; the message says why."""
 
 
+class OutsidePhoto(Unusable):
+    """A box that lies outside of its photo."""
+
+
 def read_box(
-    entry: Entry, convention: BoxConvention, sent: Size, photo: Size
+    entry: Entry, convention: BoxConvention, sent: Size, photo: Size, *, turned: bool = False
 ) -> tuple[Box, list[str]]:
     """Return an entry's box in the photo's pixels, inside it, and what had to be mended.
 
-    Raises Unusable.
+    ``turned`` reads it with across and down in the place of each other.
+    Raises Unusable, or OutsidePhoto.
     """
     values, named = _values(entry)
+    if turned and not named:
+        values = values[1], values[0], values[3], values[2]
     notes: list[str] = []
     if convention != "xyxy_unit" and max(map(abs, values)) <= 1 and any(v % 1 for v in values):
         values = _from_unit(values, convention, sent)
@@ -60,6 +67,9 @@ def _values(entry: Entry) -> tuple[Box, bool]:
         for names in _NAMED:
             if all(name in raw for name in names):
                 return _four([raw[name] for name in names]), True
+        if all(name in raw for name in ("x", "y", "width", "height")):
+            x, y, width, height = _four([raw[name] for name in ("x", "y", "width", "height")])
+            return (x, y, x + width, y + height), True
         raise Unusable(f"its box has the keys {', '.join(map(str, list(raw)[:6]))}")
     if isinstance(raw, str):
         raw = _NUMBER.findall(raw)
@@ -96,7 +106,7 @@ def _inside(box: Box, photo: Size, notes: list[str]) -> Box:
     x0, y0, x1, y1 = box
     beyond = max(-x0 / width, -y0 / height, x1 / width - 1, y1 / height - 1)
     if beyond > SLACK:
-        raise Unusable(
+        raise OutsidePhoto(
             "its box lies outside of its photo (if many do, the model counts in another way: "
             "set propose.boxes)"
         )

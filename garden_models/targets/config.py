@@ -51,8 +51,13 @@ class ProposeTargets:
     temperature: float | None = None
     """Randomness of the answer; the server's own if not given."""
 
+    thinking: Literal["", "minimal", "low", "medium", "high"] = ""
+    """How much a model may think before it answers; as much as it likes if not given."""
+
     attempt: int = 1
-    """Another number asks again although the answer is in the store."""
+    """Another number asks again although the answer is in the store; --force does not, since
+    the first result counts.
+    """
 
     address: str = ""
     """The server, such as http://localhost:8000/v1; the API's own if not given."""

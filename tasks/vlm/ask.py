@@ -64,7 +64,7 @@ def _wait(seconds: float, server: Server, progress: Progress) -> None:
 
 def _ask_once(server: Server, config: ProposeTargets, request: VlmRequest) -> VlmAnswer:
     api = gemini if api_of(config) == "gemini" else openai
-    body = api.body(request, config.model, config.structured, config.temperature)
+    body = api.body(request, config)
     headers = {"Content-Type": "application/json", **api.headers(server.key)}
     data = _post(server, api.path(config.model), headers, json.dumps(body).encode(), config)
     try:

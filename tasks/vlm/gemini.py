@@ -6,6 +6,7 @@ import base64
 from typing import Any
 from urllib.parse import quote
 
+from garden_models.targets.config import ProposeTargets
 from garden_models.targets.vlm_model import VlmAnswer, VlmRequest
 
 Json = dict[str, Any]
@@ -21,7 +22,7 @@ def headers(key: str) -> dict[str, str]:
     return {"x-goog-api-key": key} if key else {}
 
 
-def body(request: VlmRequest, model: str, structured: bool, temperature: float | None) -> Json:
+def body(request: VlmRequest, config: ProposeTargets) -> Json:
     """Return the request's JSON: each picture after its label, the question at the end."""
     parts: list[Json] = []
     for image in request.images:
@@ -32,11 +33,13 @@ def body(request: VlmRequest, model: str, structured: bool, temperature: float |
         ]
     parts.append({"text": request.prompt})
     settings: Json = {}
-    if structured:
+    if config.structured:
         settings["responseMimeType"] = "application/json"
         settings["responseSchema"] = _google_schema(request.schema)
-    if temperature is not None:
-        settings["temperature"] = temperature
+    if config.temperature is not None:
+        settings["temperature"] = config.temperature
+    if config.thinking:
+        settings["thinkingConfig"] = {"thinkingLevel": config.thinking.upper()}
     return {"contents": [{"role": "user", "parts": parts}], "generationConfig": settings}
 
 

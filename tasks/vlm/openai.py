@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from typing import Any
 
+from garden_models.targets.config import ProposeTargets
 from garden_models.targets.vlm_model import VlmAnswer, VlmRequest
 
 Json = dict[str, Any]
@@ -20,7 +21,7 @@ def headers(key: str) -> dict[str, str]:
     return {"Authorization": f"Bearer {key}"} if key else {}
 
 
-def body(request: VlmRequest, model: str, structured: bool, temperature: float | None) -> Json:
+def body(request: VlmRequest, config: ProposeTargets) -> Json:
     """Return the request's JSON: each picture after its label, the question at the end."""
     content: list[Json] = []
     for image in request.images:
@@ -30,14 +31,17 @@ def body(request: VlmRequest, model: str, structured: bool, temperature: float |
             {"type": "image_url", "image_url": {"url": f"data:image/jpeg;base64,{data}"}},
         ]
     content.append({"type": "text", "text": request.prompt})
-    document: Json = {"model": model, "messages": [{"role": "user", "content": content}]}
-    if structured:
+    messages = [{"role": "user", "content": content}]
+    document: Json = {"model": config.model, "messages": messages}
+    if config.structured:
         document["response_format"] = {
             "type": "json_schema",
             "json_schema": {"name": "targets", "strict": True, "schema": request.schema},
         }
-    if temperature is not None:
-        document["temperature"] = temperature
+    if config.temperature is not None:
+        document["temperature"] = config.temperature
+    if config.thinking:
+        document["reasoning_effort"] = config.thinking
     return document
 
 

@@ -67,3 +67,9 @@ def test_a_package_names_the_models_that_made_it(bound_model: str) -> None:
     assert [m["commercial_use"] for m in document["models"]] == [False, True]
     assert document["commercial_use"] is False
     assert licences_document(["embedded"])["commercial_use"] is True
+
+
+def test_a_model_that_was_asked_over_a_network_is_named() -> None:
+    (service,) = licences_document(services=["gemini-3-flash"])["services"]
+    assert (service["name"], service["used_by"]) == ("gemini-3-flash", "targets")
+    assert licences_document()["services"] == []

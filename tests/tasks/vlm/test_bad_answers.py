@@ -7,7 +7,7 @@ mug is at (200, 300) to (400, 700) and the chair at (1000, 100) to (1600, 900).
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pytest
 
@@ -18,7 +18,7 @@ from garden_models.targets.config import ProposeTargets
 from garden_models.targets.propose import propose_targets
 from tasks.vlm import asker
 from tests.tasks.vlm.conftest import SIZE
-from tests.vlm_server import Reply, VlmServer, targets_json
+from tests.vlm_server import LOCAL_MODEL, MODEL, Reply, VlmServer, targets_json
 
 MUG_BOX, CHAIR_BOX = [300, 100, 700, 200], [100, 500, 900, 800]  # top, left, bottom, right
 MUG = Target("mug", "IMG_1.jpg", (200.0, 300.0, 400.0, 700.0))
@@ -57,12 +57,14 @@ WAYS = [
         "P2": [{"label": "chair", "bbox_2d": CHAIR_BOX}]})),
     Way("as Python writes it", str(json.loads(GOOD))),
     Way("trailing commas", GOOD.replace("}]", "},]").replace("]}", "],}")),
-    Way("broken off", Reply(CUT, finish="MAX_TOKENS"), (MUG,), "degraded",
+    Way("broken off", Reply(CUT, finish="cut"), (MUG,), "degraded",
         ("the server cut the answer", "whole entries read from it: 1")),
     Way("numbers as texts", f'[{entry(box=["300", "100.0", "700", "200"])}]', (MUG,)),
     Way("a box as a text", f'[{entry(box="[300, 100, 700, 200]")}]', (MUG,)),
     Way("a box by its sides",
         f"[{entry(box={'xmin': 100, 'ymin': 300, 'xmax': 200, 'ymax': 700})}]", (MUG,)),
+    Way("a corner and a size",
+        f"[{entry(box={'x': 100, 'y': 300, 'width': 100, 'height': 400})}]", (MUG,)),
     Way("a box of two corners", f"[{entry(box=[[300, 100], [700, 200]])}]", (MUG,)),
     Way("corners swapped", f"[{entry(box=[700, 200, 300, 100])}]", (MUG,), "ok",
         ("mug: the corners of its box were swapped",)),
@@ -108,10 +110,12 @@ WAYS = [
 ]  # fmt: skip
 
 
+@pytest.mark.parametrize("model", [MODEL, LOCAL_MODEL])
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.name)
 def test_what_can_be_used_is_used_and_the_rest_is_said(
-    way: Way, vlm: VlmServer, config: ProposeTargets, capture: Capture
+    way: Way, model: str, vlm: VlmServer, config: ProposeTargets, capture: Capture
 ) -> None:
+    config = replace(config, model=model, boxes="yxyx_1000")
     vlm.say(way.said)
     found = propose_targets(capture, (), config, asker(config, silent))
     assert found.targets == way.targets
@@ -123,6 +127,18 @@ def test_what_can_be_used_is_used_and_the_rest_is_said(
         assert found.verdict.reasons == ()
     text = way.said if isinstance(way.said, str) else way.said.text
     assert found.queries[0].answer == text
+
+
+def test_pixels_in_the_other_order_are_told_by_what_does_not_fit(
+    vlm: VlmServer, config: ProposeTargets, capture: Capture
+) -> None:
+    config = replace(config, boxes="xyxy_px", photo_side=1000)
+    turned = targets_json(("mug", "P1", [150, 100, 350, 200]), ("chair", "P2", [50, 500, 450, 800]))
+    vlm.say(turned)
+    found = propose_targets(capture, (), config, asker(config, silent))
+    assert found.targets == (MUG, CHAIR)
+    assert found.verdict.status == "degraded"
+    assert "across and down in the place of each other" in found.verdict.reasons[0]
 
 
 @pytest.mark.parametrize(

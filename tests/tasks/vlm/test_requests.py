@@ -77,7 +77,7 @@ def test_photos_are_chosen_evenly(vlm: VlmServer, config: ProposeTargets, captur
 def test_both_apis_are_held_to_the_schema_unless_that_is_switched_off(
     vlm: VlmServer, config: ProposeTargets, capture: Capture
 ) -> None:
-    local = replace(config, model=LOCAL_MODEL, temperature=0.0)
+    local = replace(config, model=LOCAL_MODEL, temperature=0.0, thinking="low")
     for wanted in (config, local, replace(local, structured=False)):
         key = "box_2d" if wanted is config else "bbox_2d"
         vlm.say(targets_json(("mug", "P1", [100, 300, 200, 700]), key=key))
@@ -90,10 +90,11 @@ def test_both_apis_are_held_to_the_schema_unless_that_is_switched_off(
         {"type": "INTEGER"},
     )
     assert "additionalProperties" not in json.dumps(google)
-    assert "temperature" not in google["generationConfig"]
+    assert not {"temperature", "thinkingConfig"} & google["generationConfig"].keys()
     strict = openai["response_format"]["json_schema"]
     assert strict["schema"]["properties"]["targets"]["items"]["required"] == [
         "name", "photo", "bbox_2d", "why",
     ]  # fmt: skip
     assert (openai["model"], openai["temperature"]) == (LOCAL_MODEL, 0.0)
+    assert openai["reasoning_effort"] == "low"
     assert "response_format" not in plain
