@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 ADAPTERS: dict[str, str] = {
     "depth_anything_3": "garden_models.reconstruction.depth_anything_3",
-    "depth_anything_3_base": "garden_models.reconstruction.depth_anything_3_base",
     "vggt": "garden_models.reconstruction.vggt",
     "pi3": "garden_models.reconstruction.pi3",
     "grounding_dino": "garden_models.targets.grounding_dino",
