@@ -77,7 +77,9 @@ def check_targets(
     try:
         answer = _read(reply, photos, config)
     except BadInput as error:
-        unread = Verdict("degraded", (f"the boxes were not checked: {error}",))
+        unread = Verdict(
+            "degraded", (f"the boxes were not checked (propose.attempt asks again): {error}",)
+        )
         verdict = proposal.verdict.worst(unread)
         return dataclasses.replace(proposal, queries=queries, verdict=verdict)
     checked = apply_check(proposal.targets, answer)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import random
+import threading
 import time
+from collections.abc import Callable
+from concurrent.futures import Future, wait
 from typing import Any
 
 from garden_models.progress import Progress
@@ -43,8 +46,9 @@ def _with_retries(
     pause = config.pause_s
     for left in range(config.tries - 1, -1, -1):
         try:
-            progress(0.1, f"asking {config.model}")
-            return _ask_once(server, config, request)
+            return _stoppably(
+                lambda: _ask_once(server, config, request), f"asking {config.model}", progress
+            )
         except ModelUnavailable as error:
             wait_s = pause * random.uniform(0.5, 1.5) if error.wait_s is None else error.wait_s
             if not error.transient or left == 0 or wait_s > LONGEST_WAIT_S:
@@ -52,6 +56,23 @@ def _with_retries(
         _wait(wait_s, server, progress)
         pause = min(2 * pause, LONGEST_WAIT_S / 2)
     raise AssertionError("tries is at least 1")
+
+
+def _stoppably(ask: Callable[[], VlmAnswer], doing: str, progress: Progress) -> VlmAnswer:
+    """Return what ``ask`` gives; the user's stop does not wait for a server that is silent."""
+    outcome: Future[VlmAnswer] = Future()
+
+    def work() -> None:
+        try:
+            outcome.set_result(ask())
+        except BaseException as error:  # noqa: BLE001 - whoever waits for it gets it
+            outcome.set_exception(error)
+
+    threading.Thread(target=work, name="ask", daemon=True).start()
+    started = time.monotonic()
+    while not wait([outcome], _LOOK_EVERY_S).done:
+        progress(0.1, f"{doing}, {time.monotonic() - started:.0f} s")
+    return outcome.result()
 
 
 def _wait(seconds: float, server: Server, progress: Progress) -> None:

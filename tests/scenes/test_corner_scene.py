@@ -21,6 +21,7 @@ from flows.scene_run import SceneRequest, plan_scene
 from storage import Store
 from tasks.step import RunContext, run_context
 from tests.scenes.corner_truth import CORNER, load_corner
+from tests.vlm_server import KEY, KEY_VARIABLE, MODEL, Reply, VlmServer, targets_json
 
 SCENE_STEPS = {"clean_background", "compose", "simulate", "render"}
 
@@ -161,6 +162,48 @@ def test_another_box_reruns_only_that_target_and_what_joins_the_targets(run: Run
     assert ("segment", "jar") in again.executed
     for step, target in again.executed - {("find_rivals", "duck"), ("find_rivals", "house")}:
         assert step in SCENE_STEPS or target == "jar"
+
+
+def test_a_model_that_proposes_the_same_boxes_reruns_nothing(
+    run: Run, vlm: VlmServer, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = json.loads((run.folder / "corner" / "targets.json").read_text())
+    photos = sorted(path.name for path in (run.folder / "corner" / "images").iterdir())
+    said = targets_json(*(
+        (t["name"], f"P{1 + photos.index(t['image'])}", t["box"]) for t in document["targets"]
+    ))  # fmt: skip
+    vlm.say(said, said, Reply(status=401, body=KEY.encode()))
+    asked = {"address": vlm.url, "key_variable": KEY_VARIABLE, "boxes": "xyxy_px", "max_photos": 24}
+    settings = [word for k, v in asked.items() for word in ("--set", f"propose.{k}={v}")]
+    place = run.folder / "proposed"
+
+    def propose(goal: str) -> tuple[int, Run]:
+        more = ("--propose", MODEL, "--goal", goal, *settings, "--out", str(place))
+        code = main(
+            ["factorize", str(run.folder / "corner"), "--store", str(run.folder / "store"), *more]
+        )
+        report = json.loads((place / "corner" / "report.json").read_text())
+        return code, Run(place, code, report)
+
+    code, proposed = propose("build a tower")
+    assert proposed.executed == {("propose_targets", None), ("check_targets", None)}
+    assert code == run.code
+    assert proposed.report["proposal"]["goal"] == "build a tower"
+    assert [o["box"] for o in proposed.report["objects"]] == [
+        o["box"] for o in run.report["objects"]
+    ]
+    targets = json.loads((place / "corner" / "targets.json").read_text())
+    assert [t["box"] for t in targets["targets"]] == [t["box"] for t in document["targets"]]
+
+    code, refused = propose("knock it over")
+    assert (code, refused.executed) == (1, set())
+    assert f"refused the key in {KEY_VARIABLE}" in refused.report["reasons"][0]
+    code, again = propose("build a tower")
+    assert (code, again.executed, len(vlm.asked)) == (run.code, set(), 3)
+
+    said_aloud = "".join(capsys.readouterr())
+    files = [p.read_bytes() for p in run.folder.rglob("*") if p.is_file()]
+    assert not any(KEY.encode() in data for data in [*files, said_aloud.encode()])
 
 
 def test_the_store_is_sound_and_explains_itself(

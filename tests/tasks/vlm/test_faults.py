@@ -143,6 +143,17 @@ def test_the_users_stop_ends_the_waiting(vlm: VlmServer, config: ProposeTargets)
     assert len(vlm.asked) == 1
 
 
+def test_the_users_stop_does_not_wait_for_a_silent_server(
+    vlm: VlmServer, config: ProposeTargets
+) -> None:
+    def stop(_share: float, _doing: str) -> None:
+        raise Cancelled("the run was stopped")
+
+    vlm.say(Reply("late", delay_s=9))
+    with pytest.raises(Cancelled):
+        ask(replace(config, timeout_s=5.0), stop)
+
+
 def test_the_key_is_in_its_header_and_nowhere_else(
     vlm: VlmServer, config: ProposeTargets, caplog: pytest.LogCaptureFixture
 ) -> None:
