@@ -13,6 +13,9 @@ from typing import Any
 
 os.environ.setdefault("PREFECT_SERVER_ANALYTICS_ENABLED", "false")
 os.environ.setdefault("PREFECT_LOGGING_LEVEL", "CRITICAL")
+# A busy server answers 503: try for eight minutes, each pause twice the last, instead of for one,
+# since a scene whose flow run cannot be recorded fails.
+os.environ.setdefault("PREFECT_CLIENT_MAX_RETRIES", "8")
 
 import httpx
 from prefect import Flow, flow, tags
