@@ -24,8 +24,7 @@ Say = Callable[[str], None]
 def measure_all(options: OrchestrationOptions, folder: Path, say: Say) -> BenchmarkReport:
     """Return the report; everything that is written meanwhile lies below ``folder``.
 
-    Raises PeerMissing before anything is measured, WrongResult, SceneFailed,
-    SceneNotOk.
+    Raises PeerMissing before anything is measured, WrongResult, SceneFailed.
     """
     if "steps" in options.parts:
         check_installed(PEERS)

@@ -19,6 +19,7 @@ BLOCK = 100
 LAST_OF_FIRST = 1.2
 RESTART_S = 60.0
 _MB = 1e6
+_NAMED = 5
 
 BLOCKS_METHOD = """\
 Simulated scenes of the real flow's shape (8 steps and 5 an object, 4 KB each), run by the
@@ -104,7 +105,12 @@ def scale_sections(result: ScaleResult) -> list[Section]:
         f" {options.processes} processes: {result.wall_s:.1f} s"
     )
     sections = [
-        Section(title, BLOCKS_METHOD, [_block_row(b) for b in blocks], _claims(result, blocks)),
+        Section(
+            title,
+            "\n".join([BLOCKS_METHOD, *result.wrong[:_NAMED]]),
+            [_block_row(b) for b in blocks],
+            _claims(result, blocks),
+        ),
         Section("What the store grew by", GROWTH_METHOD, _store_rows(result)),
     ]
     if result.server is not None:
@@ -120,6 +126,7 @@ def _claims(result: ScaleResult, blocks: list[Block]) -> tuple[Measure, ...]:
         Measure("memory in the last block", last.rss / first.rss, LAST_OF_FIRST, "x first"),
         Measure("restart over finished scenes", result.restart.seconds, RESTART_S, "s"),
         Measure("steps that the restart executed", result.restart.executed, 0, ""),
+        Measure("scenes that went wrong", len(result.wrong), 0, ""),
     )
 
 

@@ -57,7 +57,6 @@ def run(options: argparse.Namespace) -> int:
     """Measure, and print every claim with its limit; return the exit code."""
     from flows.benchmark.orchestration.measure_all import measure_all
     from flows.benchmark.orchestration.peers.all_peers import PeerMissing
-    from flows.benchmark.orchestration.scale import SceneNotOk
     from flows.benchmark.orchestration.scene_overhead import SceneFailed
     from flows.benchmark.orchestration.step_cost import WrongResult
 
@@ -65,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
     try:
         with open_store(options).scratch() as folder:
             report = measure_all(asked, folder, say)
-    except (PeerMissing, WrongResult, SceneFailed, SceneNotOk) as error:
+    except (PeerMissing, WrongResult, SceneFailed) as error:
         say(f"garden: {error}")
         return EXIT_FAILED
     if asked.out is not None:
