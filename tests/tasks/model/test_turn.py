@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tasks.model.launch import Launch
@@ -37,6 +37,7 @@ def test_the_oldest_goes_first_unless_a_younger_one_needs_no_load() -> None:
     assert next_turn(queue, B) == 1
 
 
+@example(["a"] * 200)
 @given(st.lists(st.sampled_from("ab"), min_size=1, max_size=400))
 def test_nobody_is_overtaken_more_often_than_the_bound(names: list[str]) -> None:
     """Questions arrive one a turn; each is answered after a bounded number of turns."""

@@ -78,6 +78,26 @@ def test_a_model_that_is_not_here_is_told_and_the_others_are_measured(
     assert row["model"] == "flat_wall"
 
 
+@pytest.mark.slow
+def test_depth_anything_3_is_measured_with_random_weights(home: Path) -> None:
+    report = measure_all(
+        names=("depth_anything_3",),
+        photos=(2,),
+        size=(84, 56),
+        repeats=1,
+        random=True,
+        variant=None,
+        folder=home / "random",
+        say=print,
+    )
+    assert report.failed == {}
+    (found,) = report.measured
+    assert found.model == "depth_anything_3/da3-small"
+    assert min(found.bare.load_s, found.step.load_s, found.bare.run_s, found.model_s) > 0
+    assert found.step.run_s >= found.model_s
+    assert "random weights" in report.to_text()
+
+
 @pytest.mark.parametrize("words", [["--size", "640"], ["--photos", "0"], ["--repeats", "0"]])
 def test_wrong_options_are_told(home: Path, words: list[str]) -> None:
     assert main(["benchmark", "models", *words, "--store", str(home / "store")]) == 2
