@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from garden_models.progress import Progress, silent
+from garden_models.progress import AS_BEFORE, Progress, silent
 from tasks.model.checked import check_answer
 from tasks.model.keeper_client import KeeperClient, keeper_address
 from tasks.model.launch import launch_of
@@ -20,7 +20,8 @@ def predictor(name: str, progress: Progress = silent) -> Iterator[Callable[[Any]
     """Give what asks a model: called with a request, it returns the answer.
 
     The model is loaded at the first call, and stays loaded until another one needs its device.
-    The same request has the same answer, whatever was asked before.
+    The same request has the same answer, whatever was asked before. ``progress`` is told what
+    the model is doing, not how far.
 
     Raises:
         BadInput: there is no such model, or what it needs is not here; says what to do.
@@ -31,8 +32,11 @@ def predictor(name: str, progress: Progress = silent) -> Iterator[Callable[[Any]
     _request, expected = nouns_of(launch.module)
     with _asking() as ask:
 
+        def report(_share: float, doing: str) -> None:
+            progress(AS_BEFORE, doing)
+
         def predict(request: Any) -> Any:
-            answer = ask(launch, request, progress, is_stopped)
+            answer = ask(launch, request, report, is_stopped)
             check_answer(name, request, answer, expected)
             return answer
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from garden_models.progress import Progress
+from garden_models.progress import AS_BEFORE, Progress
 from garden_models.scene import Verdict
 from storage import Published
 from storage.redact import redact, redacted
@@ -82,12 +82,13 @@ def stoppable(cancelled: threading.Event, report: Callable[[float, str], None]) 
 
     It also is where a step notices that the user stopped the run.
     """
-    last = 0.0
+    last = so_far = 0.0
 
     def progress(share: float, doing: str) -> None:
-        nonlocal last
+        nonlocal last, so_far
         if cancelled.is_set():
             raise Cancelled("the run was stopped")
+        share = so_far = so_far if share == AS_BEFORE else share
         now = time.monotonic()
         if now - last >= _PROGRESS_EVERY_S or share >= 1.0:
             last = now

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from garden_models.progress import Progress, silent
 from garden_models.scene import Target
 from tasks.model import backend_of, predictor, weights_of
 from tasks.step import step
@@ -38,15 +39,16 @@ def _weights(target: Target, config: Asking) -> dict[str, str]:
     return weights_of(config.model(target))
 
 
-def _ask(target: Target, config: Asking) -> Answer:
-    with predictor(config.model(target)) as predict:
+def _ask(target: Target, config: Asking, progress: Progress = silent) -> Answer:
+    with predictor(config.model(target), progress) as predict:
         answer: Answer = predict(Question(np.ones((3, 2)), config.of(target)))
     return answer
 
 
 @step(version=1, backend=_backend, weights=_weights, retries=0)
-def ask(target: Target, config: Asking) -> Answer:
-    return _ask(target, config)
+def ask(target: Target, config: Asking, progress: Progress = silent) -> Answer:
+    progress(0.5, "thinking of a question")
+    return _ask(target, config, progress)
 
 
 @step(version=1, backend=_backend, weights=_weights, isolated=True, retries=0, time_limit_s=6)

@@ -25,7 +25,7 @@ from tasks.model.exchange import exchange_root
 from tasks.model.log import log_file
 from tasks.model.resident import residents
 from tasks.model.settings import settings_file
-from tasks.step import Ref, RunContext, StepEvent, StepFailed, fan_out, run_context
+from tasks.step import Ref, RunContext, StepEvent, StepFailed, compute, fan_out, run_context
 from tests.tasks.model import liar
 from tests.tasks.model.doubler import loads
 from tests.tasks.model.nouns import Answer, Question
@@ -183,6 +183,21 @@ def test_a_worker_that_lies_is_found_out(models: Path, store: Store, how: str) -
     for ref in (good, late):
         assert isinstance(ref, Ref)
         assert store.read(ref.object, Answer).values.tolist() == [[3.0, 3.0]] * 3
+
+
+def test_a_step_tells_what_its_model_does_and_goes_no_step_back(
+    apart: Path, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compute, "_PROGRESS_EVERY_S", 0.0)
+    events: list[StepEvent] = []
+    with run_context(RunContext(store, "room", events=events.append)):
+        ask(TARGETS[0], Asking())
+    told = [(e.share, e.doing) for e in events if e.kind == "progress"]
+    assert told == [
+        (0.5, "thinking of a question"),
+        (0.5, "loading doubler"),
+        (0.5, "running doubler"),
+    ]
 
 
 def test_an_interpreter_that_is_not_there_is_named(models: Path) -> None:
