@@ -12,6 +12,7 @@ from tasks.model.launch import Launch
 from tasks.model_worker.nouns import nouns_of
 from tasks.model_worker.payload import BadPayload, read_payload, write_payload
 from tasks.model_worker.protocol import ANSWER_FOLDER, REQUEST_FOLDER
+from tasks.step.memory import see_elsewhere
 
 AskFolder = Callable[[Path, str], dict[str, Any]]
 """Given an exchange folder and the question's digest, returns what is said of the answer."""
@@ -25,6 +26,7 @@ def ask_worker(ask: AskFolder, launch: Launch, request: Any) -> Any:
     _request, expected = nouns_of(launch.module)
     with exchange() as folder:
         said = ask(folder, write_payload(request, folder / REQUEST_FOLDER))
+        see_elsewhere(int(said["peak_gb"] * 1e9))
         try:
             return read_payload(folder / ANSWER_FOLDER, said["digest"], expected)
         except BadPayload as error:

@@ -29,11 +29,11 @@ class Tally:
         self._guard = threading.Lock()
 
     def loaded(self, name: str, said: dict[str, Any]) -> None:
-        """Count a load, by what the worker says of it."""
+        """Count a load, by what the worker says of it (``protocol.COSTS``)."""
         with self._guard:
             cost = self._costs.setdefault(name, Cost())
             cost.loads += 1
-            cost.load_s += float(said.get("seconds", 0.0))
+            cost.load_s += said["seconds"]
             _see(cost, said)
 
     def answered(self, name: str, said: dict[str, Any]) -> None:
@@ -41,7 +41,7 @@ class Tally:
         with self._guard:
             cost = self._costs.setdefault(name, Cost())
             cost.calls += 1
-            cost.run_s += float(said.get("seconds", 0.0))
+            cost.run_s += said["seconds"]
             _see(cost, said)
 
     def failed(self, name: str) -> None:
@@ -56,5 +56,5 @@ class Tally:
 
 
 def _see(cost: Cost, said: dict[str, Any]) -> None:
-    cost.peak_gb = max(cost.peak_gb, float(said.get("peak_gb", 0.0)))
-    cost.peak_gpu_gb = max(cost.peak_gpu_gb, float(said.get("peak_gpu_gb", 0.0)))
+    cost.peak_gb = max(cost.peak_gb, said["peak_gb"])
+    cost.peak_gpu_gb = max(cost.peak_gpu_gb, said["peak_gpu_gb"])

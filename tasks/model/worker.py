@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -28,6 +29,8 @@ from tasks.step.ref import Cancelled
 Report = Callable[[float, str], None]
 
 _POLL_S = 0.1
+_MOST = 1e9  # seconds or gigabytes: more is no answer
+_CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|[^\x20-\x7e\xa0-\U0010ffff\t]")
 
 
 def never() -> bool:
@@ -71,8 +74,8 @@ class ModelWorker:
             self._say({protocol.ASK: question})
             said = self._expect(protocol.ANSWER, deadline, report, stopped)
             if said.get("id") != self._asked or not isinstance(said.get("digest"), str):
-                raise self._ended(f"answered another question than it was asked: {said}")
-            return said
+                raise self._ended("answered another question than it was asked")
+            return {"digest": said["digest"], **self._costs(said)}
         except _Told as told:
             if not self.loaded:
                 self.close()
@@ -115,7 +118,15 @@ class ModelWorker:
                 }
             }
         )
-        self.loaded = self._expect(protocol.LOADED, deadline, report, stopped)
+        self.loaded = self._costs(self._expect(protocol.LOADED, deadline, report, stopped))
+
+    def _costs(self, said: dict[str, Any]) -> dict[str, float]:
+        """Return the seconds and gigabytes that the worker tells."""
+        costs = {name: said.get(name, 0.0) for name in protocol.COSTS}
+        for name, cost in costs.items():
+            if isinstance(cost, bool) or not isinstance(cost, int | float) or not 0 <= cost < _MOST:
+                raise self._ended(f"tells {str(cost)[:40]!r} as {name}")
+        return costs
 
     def _say(self, message: dict[str, Any]) -> None:
         stdin = self._child.process.stdin
@@ -187,7 +198,8 @@ class ModelWorker:
                 if not line.endswith(b"\n") and self.alive:
                     break  # it is still being written
                 self._told += len(line)
-                self._log.info("%s", redact(line.decode(errors="replace").rstrip()))
+                text = _CONTROL.sub("", line.decode(errors="replace").rstrip())
+                self._log.info("%s", redact(text))
 
 
 class _Told(Exception):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextvars
 import os
 import threading
 import time
@@ -59,6 +60,16 @@ class _Sampler:
 _sampler = _Sampler()
 
 
+_of_step: contextvars.ContextVar[Peak] = contextvars.ContextVar("garden_peak")
+
+
+def see_elsewhere(held_bytes: int) -> None:
+    """Count memory that another process holds for the step that this code is part of."""
+    peak = _of_step.get(None)
+    if peak is not None:
+        peak.see(process_rss(os.getpid()) + held_bytes)
+
+
 @contextmanager
 def peak_memory() -> Iterator[Peak]:
     """Watch this process' resident memory while a step runs in it.
@@ -68,9 +79,11 @@ def peak_memory() -> Iterator[Peak]:
     peak = Peak()
     peak.see(process_rss(os.getpid()))
     _sampler.add(peak)
+    token = _of_step.set(peak)
     try:
         yield peak
     finally:
+        _of_step.reset(token)
         _sampler.remove(peak)
         peak.see(process_rss(os.getpid()))
 

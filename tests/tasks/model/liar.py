@@ -73,7 +73,8 @@ def main() -> None:
     say("hello, I am a program" if how == "greeting" else {"hello": {"protocol": version}})
     hear()
     say({"progress": ["a third", 3]} if how == "progress" else {"progress": [0.5, "loading"]})
-    say([1, 2] if how == "list" else {"loaded": {"seconds": 0.1}})
+    loaded = float("nan") if how == "no number loaded" else 0.1
+    say([1, 2] if how == "list" else {"loaded": {"seconds": loaded}})
     asked = hear()["ask"]
     if how == "flood":
         sys.stdout.write("x" * (9 << 20))
@@ -82,9 +83,12 @@ def main() -> None:
         say("Segmentation fault (not really)")
     if how == "unknown word":
         say({"maybe": {}})
+    if how == "bad error":
+        say({"error": "it went wrong"})
+    seconds = "a while" if how == "no number" else 0.1
     number = asked["id"] + 5 if how == "other question" else asked["id"]
     digest = answer(Path(asked["folder"]) / "answer", how)
-    say({"answer": {"id": number, "digest": digest, "seconds": 0.1}})
+    say({"answer": {"id": number, "digest": digest, "seconds": seconds}})
     hear()
 
 

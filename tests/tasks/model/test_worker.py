@@ -26,6 +26,7 @@ from tasks.model.log import log_file
 from tasks.model.resident import residents
 from tasks.model.settings import settings_file
 from tasks.step import Ref, RunContext, StepEvent, StepFailed, compute, fan_out, run_context
+from tasks.step.memory import peak_memory, process_rss
 from tests.tasks.model import liar
 from tests.tasks.model.doubler import loads
 from tests.tasks.model.nouns import Answer, Question
@@ -70,11 +71,12 @@ def reason(store: Store, how: str) -> tuple[str, str]:
 
 
 def test_it_answers_as_in_this_process_and_stays_loaded(apart: Path) -> None:
-    with predictor("doubler") as predict:
+    with peak_memory() as peak, predictor("doubler") as predict:
         there = [predict(QUESTION) for _ in range(3)]
         pid = int(predict(Question(QUESTION.values, "pid")).noise)
     assert loads(apart) == 1
     assert pid != os.getpid()
+    assert peak.mb > process_rss(os.getpid()) / 1e6 + 10, "the worker's memory is the step's"
     settings()
     with predictor("doubler") as predict:
         here = predict(QUESTION)
@@ -134,6 +136,9 @@ def test_a_hang_ends_at_the_time_limit_with_all_that_it_started(apart: Path, sto
     kind, said = reason(store, "hang")
     assert kind == "ModelFailed"
     assert "doubler: its worker was stopped after 4 s, its time limit" in said
+    child = re.search(r"child (\d+)", said)
+    assert child is not None
+    wait_for(lambda: not alive(int(child[1])))
 
 
 @pytest.mark.slow
@@ -152,11 +157,14 @@ LIES = {
     "version": "speaks garden.worker/99, and this GARDEN garden.worker/1",
     "greeting": "does not keep to the protocol: it wrote hello, I am a program",
     "list": "does not keep to the protocol: it wrote [1, 2]",
+    "no number loaded": "tells 'nan' as seconds",
     "progress": "does not keep to the protocol: it wrote could not convert string to float",
     "garbage": "does not keep to the protocol: it wrote Segmentation fault (not really)",
     "flood": "does not keep to the protocol: it wrote a line of more than 8 MB",
     "unknown word": 'does not keep to the protocol: it wrote {"maybe": {}}',
     "other question": "answered another question than it was asked",
+    "no number": "tells 'a while' as seconds",
+    "bad error": "does not keep to the protocol: it wrote",
     "missing member": "the member 0000.npy is missing",
     "unlisted member": "the member 0000.npy is not listed",
     "changed member": "the member 0000.npy is not what was written",
@@ -259,13 +267,16 @@ def test_it_dies_with_its_parent(apart: Path) -> None:
         parent.kill()
 
 
-def test_a_stopped_run_ends_the_question_and_the_worker(apart: Path, store: Store) -> None:
+def test_a_stopped_run_ends_the_question_and_the_worker(
+    apart: Path, store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compute, "_PROGRESS_EVERY_S", 0.0)
     pids: list[int] = []
     with predictor("doubler") as predict:
         pids.append(int(predict(Question(QUESTION.values, "pid")).noise))
 
     def listen(event: StepEvent) -> None:
-        if event.kind == "started":
+        if event.doing == "running doubler":
             context.cancelled.set()
 
     context = RunContext(store, "room", events=listen)
