@@ -7,6 +7,7 @@ import os
 import select
 import socket
 import threading
+import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -23,6 +24,10 @@ from tasks.step.waiting import waiting
 
 VARIABLE = "GARDEN_KEEPER"
 OFF = "off"
+KEEPER = "the models' keeper"
+HELLO_S = 120.0
+"""How long a keeper may take to start, or to tell what models cost."""
+
 _POLL_S = 0.1
 
 
@@ -44,14 +49,16 @@ class KeeperClient:
         self._buffer = b""
         try:
             self._socket.connect(str(address))
-            hello = self._expect(protocol.HELLO, "the models' keeper", lambda _s, _d: None)
+            hello = self._expect(protocol.HELLO, KEEPER, tell_nobody, _after(HELLO_S))
         except OSError as error:
             self._socket.close()
             raise _gone(error) from None
+        except Cancelled:
+            raise ModelFailed(f"{KEEPER} did not start within {HELLO_S:g} s") from None
         if hello.get("protocol") != protocol.VERSION:
             self.close()
             raise ModelFailed(
-                f"the models' keeper speaks {hello.get('protocol')}, and this GARDEN"
+                f"{KEEPER} speaks {hello.get('protocol')}, and this GARDEN"
                 f" {protocol.VERSION}: start the run again"
             )
 
@@ -73,7 +80,7 @@ class KeeperClient:
     def status(self) -> dict[str, dict[str, Any]]:
         """Return what each model cost so far (``tally.Cost``)."""
         self._send({protocol.STATUS: True})
-        return self._expect(protocol.STATUS, "the models' keeper", lambda _s, _d: None)
+        return self._expect(protocol.STATUS, KEEPER, tell_nobody, _after(HELLO_S))
 
     def close(self) -> None:
         """Hang up: the keeper counts on no more questions from here."""
@@ -86,7 +93,7 @@ class KeeperClient:
             raise _gone(error) from None
 
     def _expect(
-        self, word: str, name: str, report: Report, stopped: Callable[[], bool] = lambda: False
+        self, word: str, name: str, report: Report, stopped: Callable[[], bool]
     ) -> dict[str, Any]:
         with ExitStack() as its_turn:
             its_turn.enter_context(waiting())
@@ -118,6 +125,16 @@ class KeeperClient:
         return [json.loads(line) for line in lines]
 
 
+def tell_nobody(share: float, doing: str) -> None:
+    """Ignore what a model is doing."""
+
+
+def _after(seconds: float) -> Callable[[], bool]:
+    """Return what tells whether so many seconds have gone by."""
+    deadline = time.monotonic() + seconds
+    return lambda: time.monotonic() > deadline
+
+
 def _gone(error: OSError | None) -> ModelFailed:
     why = f" ({error.strerror})" if error is not None and error.strerror else ""
-    return ModelFailed(f"the models' keeper is gone{why}: start the run again")
+    return ModelFailed(f"{KEEPER} is gone{why}: start the run again")

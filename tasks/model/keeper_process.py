@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import os
+import signal
 import socket
 import subprocess
 import sys
+import threading
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,10 +17,20 @@ from typing import Any
 
 from garden_models.foundation.failure import ModelFailed
 from tasks.model.keeper_client import VARIABLE, KeeperClient
+from tasks.model.tally import added
 from tasks.step.slots import runtime_folder
 
-Costs = Callable[[], dict[str, dict[str, Any]]]
-"""Returns what each model cost so far (``tally.Cost`` as JSON)."""
+ByModel = dict[str, dict[str, Any]]
+"""What each model cost (``tally.Cost`` as JSON)."""
+
+Costs = Callable[[], ByModel]
+"""Returns what each model cost so far."""
+
+GRACE_S = 5.0
+"""How long a keeper may take to end its workers."""
+
+MOST_STARTS = 20
+"""A keeper that died as often is not started again."""
 
 
 def kept_by() -> dict[str, str]:
@@ -35,54 +47,82 @@ def is_wanted() -> bool:
 def model_keeper() -> Iterator[Costs]:
     """Have all processes that are started inside ask their models of one keeper.
 
-    It ends with this process, and its workers with it. The last costs are known afterwards too.
+    One that dies is started again. It ends with this process, and its workers with it. The
+    last costs are known afterwards too.
     """
-    address = runtime_folder() / f"keeper-{uuid.uuid4().hex[:12]}.sock"
-    process = _start(address)
     before = os.environ.get(VARIABLE)
-    os.environ[VARIABLE] = str(address)
-    known: dict[str, dict[str, Any]] = {}
-
-    def costs() -> dict[str, dict[str, Any]]:
-        if process.poll() is None:
-            with contextlib.suppress(ModelFailed, OSError):
-                client = KeeperClient(address)
-                known.update(client.status())
-                client.close()
-        return known
-
+    kept = _Kept(runtime_folder() / f"keeper-{uuid.uuid4().hex[:12]}.sock")
+    os.environ[VARIABLE] = str(kept.address)
     try:
-        yield costs
+        yield kept.costs
     finally:
-        costs()
+        kept.costs()
         if before is None:
             del os.environ[VARIABLE]
         else:
             os.environ[VARIABLE] = before
-        process.terminate()
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(timeout=10)
-        process.kill()
-        process.wait()
-        address.unlink(missing_ok=True)
+        kept.end()
 
 
-def _start(address: Path) -> subprocess.Popen[bytes]:
-    with socket.socket(socket.AF_UNIX) as listening:
-        listening.bind(str(address))
+class _Kept:
+    """The keeper's socket, and the thread that keeps a keeper on it."""
+
+    def __init__(self, address: Path) -> None:
+        self.address = address
+        self._socket = socket.socket(socket.AF_UNIX)
+        self._socket.bind(str(address))
         address.chmod(0o600)
-        listening.listen(128)
+        self._socket.listen(128)
+        self._ending = threading.Event()
+        self._started = threading.Event()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._now: ByModel = {}
+        self._before: ByModel = {}  # what keepers that died had counted
+        self._thread = threading.Thread(target=self._keep, daemon=True)
+        self._thread.start()
+        self._started.wait()
+
+    def costs(self) -> ByModel:
+        """Return what each model cost so far, as far as the keeper tells."""
+        if not self._ending.is_set():
+            with contextlib.suppress(ModelFailed):
+                client = KeeperClient(self.address)
+                self._now = client.status()
+                client.close()
+        return added(self._before, self._now)
+
+    def end(self) -> None:
+        """End the keeper with all its workers."""
+        self._ending.set()
+        signals = (signal.SIGTERM, signal.SIGKILL)
+        while self._thread.is_alive():  # it may just be starting another one
+            for number in signals:
+                if self._process is not None:
+                    self._process.send_signal(number)
+                self._thread.join(timeout=GRACE_S)
+                if not self._thread.is_alive():
+                    break
+        self._socket.close()
+        self.address.unlink(missing_ok=True)
+
+    def _keep(self) -> None:
+        for _ in range(MOST_STARTS):
+            self._process = self._start()
+            self._started.set()
+            self._process.wait()
+            if self._ending.is_set():
+                return
+            self._before, self._now = added(self._before, self._now), {}
+        self._socket.close()  # who asks is told that there is none
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        descriptor = self._socket.fileno()
+        command = [sys.executable, "-m", "tasks.model.keeper", str(descriptor), str(os.getpid())]
         return subprocess.Popen(
-            [
-                sys.executable,
-                "-m",
-                "tasks.model.keeper",
-                str(listening.fileno()),
-                str(os.getpid()),
-            ],
+            command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
-            pass_fds=(listening.fileno(),),
+            pass_fds=(descriptor,),
             start_new_session=True,
             env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )

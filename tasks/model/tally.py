@@ -58,3 +58,14 @@ class Tally:
 def _see(cost: Cost, said: dict[str, Any]) -> None:
     cost.peak_gb = max(cost.peak_gb, said["peak_gb"])
     cost.peak_gpu_gb = max(cost.peak_gpu_gb, said["peak_gpu_gb"])
+
+
+def added(one: dict[str, dict[str, Any]], other: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """Return two tallies (as JSON) together; of peaks the higher one counts."""
+    total = {name: dict(cost) for name, cost in one.items()}
+    for name, cost in other.items():
+        known = total.setdefault(name, dataclasses.asdict(Cost()))
+        for what, value in cost.items():
+            both = known[what], value
+            known[what] = max(both) if what.startswith("peak") else sum(both)
+    return total

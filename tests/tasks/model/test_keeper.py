@@ -78,6 +78,10 @@ def client(*words: str, how: str = "") -> subprocess.Popen[bytes]:
     )
 
 
+def parent_of(pid: int) -> int:
+    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+
+
 def test_processes_share_what_is_loaded(models: Path, keeper: Costs) -> None:
     processes = [client("doubler", "doubler") for _ in range(3)]
     said = [process.communicate(timeout=120)[0].split() for process in processes]
@@ -201,6 +205,21 @@ def test_time_in_the_queue_is_waiting_and_does_not_count_towards_a_limit(
     assert step is ask or step.spec.time_limit_s < SLOW_S
 
 
+def test_a_keeper_that_dies_is_started_again(models: Path, keeper: Costs) -> None:
+    with predictor("doubler") as predict:
+        worker = int(predict(Question(QUESTION.values, "pid")).noise)
+        assert keeper()["doubler"]["calls"] == 1
+        os.kill(parent_of(worker), signal.SIGKILL)
+        with pytest.raises(ModelFailed, match="keeper is gone"):
+            predict(QUESTION)
+    wait_for(lambda: not alive(worker))
+    with predictor("doubler") as predict:
+        assert predict(QUESTION).values[0, 0] == 2.0
+    cost = keeper()["doubler"]
+    assert (cost["loads"], cost["calls"]) == (2, 2)
+    assert cost["peak_gb"] < 1
+
+
 PARENT = """
 import sys
 import numpy as np
@@ -226,7 +245,7 @@ def test_keeper_and_workers_die_with_the_process_that_started_them(models: Path)
     try:
         assert parent.stdout is not None
         worker = int(parent.stdout.readline())
-        keeper = int(Path(f"/proc/{worker}/stat").read_text().rpartition(")")[2].split()[1])
+        keeper = parent_of(worker)
         assert keeper != parent.pid
         parent.kill()
         wait_for(lambda: not alive(worker) and not alive(keeper))
