@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from importlib import import_module
 from pathlib import Path
+from typing import Any, get_args, get_type_hints
 
 import pytest
 
@@ -16,7 +18,10 @@ from flows.collection.passes import postponed, priority, stops_of
 from flows.collection.row import SceneRow
 from flows.collection.state import CollectionState, read_state
 from flows.command.status import _lines
+from flows.preset import Preset
+from garden_models import foundation
 from storage import Store
+from tasks.step import Step
 from tests.flows.collection.model_job import STOPS, orders
 from tests.flows.collection.test_run import batch, rows_of
 from tests.tasks.model.doubler import loads, put_weights
@@ -141,6 +146,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Chosen:
+    geometry: Options = field(default_factory=Options)
     reconstruct: Options = field(default_factory=Options)
     gravity: Options = field(default_factory=Options)
     ground: Options = field(default_factory=Options)
@@ -177,12 +183,23 @@ def test_a_scene_stops_where_its_model_changes(
 
 
 def test_every_option_of_a_preset_that_can_name_a_model_has_its_step() -> None:
-    from flows import factorize, target_proposal
-    from flows.preset import Preset
-
     for option, step in passes.STEP_OF.items():
         assert hasattr(Preset(), option)
-        assert hasattr(factorize, step) or hasattr(target_proposal, step)
+        assert isinstance(getattr(import_module(f"tasks.{step}"), step), Step)
+    for option in fields(Preset):
+        config = type(getattr(Preset(), option.name))
+        named = {name for hint in get_type_hints(config).values() for name in texts(hint)}
+        if named & foundation.ADAPTERS.keys():
+            assert option.name in passes.STEP_OF, f"{option.name} can name a model"
+
+
+def texts(hint: Any) -> Iterator[str]:
+    """Give the texts that a hint such as ``tuple[Literal["a", "b"], ...]`` allows."""
+    for argument in get_args(hint):
+        if isinstance(argument, str):
+            yield argument
+        else:
+            yield from texts(argument)
 
 
 def test_passes_come_in_order_within_a_wave() -> None:
