@@ -13,6 +13,7 @@ import numpy as np
 
 from garden_models.reconstruction.geometry_model import GeometryRequest
 from garden_models.reconstruction.similarity import Similarity
+from tests.doubles.truth_scene import TruthScene
 from tests.garden_models.reconstruction.textured_room import look_at
 
 THUMB = (12, 12)
@@ -144,3 +145,16 @@ def _photo(
         [np.sin(2.1 * points[..., i] + 1.3 * points[..., (i + 1) % 3] + i) for i in range(3)], -1
     )
     return (128 + 100 * waves).astype(np.uint8), depth.astype(np.float32)
+
+
+def views_of_scene(scene: TruthScene) -> TrueViews:
+    """The photos of a whole scene's truth, with what every pixel of them shows."""
+    cameras = scene.cameras
+    sizes = [(camera.rgb.shape[1], camera.rgb.shape[0]) for camera in cameras]
+    pictures = [scene.picture(i, size) for i, size in enumerate(sizes)]
+    return TrueViews(
+        tuple(camera.rgb for camera in cameras),
+        tuple(picture.depth.astype(np.float32) for picture in pictures),
+        np.stack([camera.K for camera in cameras]),
+        np.stack([camera.camera_from_world[:3] for camera in cameras]),
+    )
