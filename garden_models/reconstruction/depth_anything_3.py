@@ -38,7 +38,7 @@ from garden_models.reconstruction.geometry_model import (
 from garden_models.reconstruction.given_cameras import InGivenWorld, in_given_world
 from garden_models.reconstruction.model_contract import check_finite, check_request, proper_camera
 from garden_models.reconstruction.photo_framing import Framing
-from garden_models.reconstruction.similarity import from_camera
+from garden_models.reconstruction.similarity import Similarity, from_camera
 from garden_models.scene import OK, BadGeometry, BadInput
 
 __all__ = ["CARD", "load", "memory_need"]
@@ -189,14 +189,16 @@ def prediction(
     return GeometryPrediction(views, metric, tokens, gaussians, verdict)
 
 
-def _moves(predicted: list[np.ndarray], given: InGivenWorld) -> list[Any]:
+def _moves(predicted: list[np.ndarray], given: InGivenWorld) -> list[Similarity]:
     return [
         from_camera(camera, view.camera_from_world, given.factor)
         for camera, view in zip(predicted, given.views, strict=True)
     ]
 
 
-def _gaussians(found: Any, keep: Bool[np.ndarray, "n h w"], moves: list[Any] | None) -> Gaussians:
+def _gaussians(
+    found: Any, keep: Bool[np.ndarray, "n h w"], moves: list[Similarity] | None
+) -> Gaussians:
     parts = read_gaussians(found["gaussians"], float(found.get("scale_factor", 1.0)), keep)
     return joined_gaussians(parts if moves is None else moved_by_view(parts, moves))
 
