@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from garden_models.foundation.failure import ModelOutOfMemory
+from garden_models.geometry.camera import camera_centre
 from garden_models.geometry.rotation import axis_angle
 from garden_models.reconstruction.chunk_limits import ChunkLimits
 from garden_models.reconstruction.chunk_merging import merge_chunks
@@ -50,12 +51,13 @@ class InWorldsOfItsOwn:
         self.rng = np.random.default_rng(seed)
         self.calls: list[int] = []
         self.most: int | None = None
+        self.known = {photo.tobytes(): i for i, photo in enumerate(truth.photos)}
 
     def __call__(self, request: GeometryRequest) -> GeometryPrediction:
         self.calls.append(len(request.photos))
         if self.most is not None and len(request.photos) > self.most:
             raise ModelOutOfMemory("no room")
-        found = self.truth.recognised(np.stack(request.photos).astype(np.float32))
+        found = [self.known[photo.tobytes()] for photo in request.photos]
         move = self._world() if request.camera_from_world is None else None
         views = tuple(self._view(i, move) for i in found)
         means = np.stack([self._point(i, move) for i in found])
@@ -121,6 +123,25 @@ def test_noise_and_outliers_do_not_bend_it(truth, seed):
     assert np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1))) < 0.3
     scales = [float(np.median(v.depth / d)) for v, d in zip(found.views, truth.depth, strict=True)]
     assert max(scales) / min(scales) < 1.01
+
+
+@pytest.mark.slow
+def test_errors_of_joints_stay_small_over_hundreds_of_photos():
+    truth = box_room(240, size=(56, 42), focal=45.0)
+    predict = InWorldsOfItsOwn(truth, noise=0.02)
+    found = predict_long(truth.request(), predict, NEED, room_for(24))
+    assert len(predict.calls) == 12
+    units = [float(np.median(d / v.depth)) for d, v in zip(truth.depth, found.views, strict=True)]
+    assert max(units) / min(units) < 1.02
+    move = Similarity(1 / units[0], np.eye(3), np.zeros(3))
+    first = np.vstack([move.camera(truth.camera_from_world[0]), [0, 0, 0, 1]])
+    world = np.linalg.inv(first) @ np.vstack([found.views[0].camera_from_world, [0, 0, 0, 1]])
+    for view, camera in zip(found.views[::20], truth.camera_from_world[::20], strict=True):
+        true = move.camera(camera) @ world
+        turn = view.camera_from_world[:, :3] @ true[:, :3].T
+        assert np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1))) < 1.0
+        off = camera_centre(view.camera_from_world) - camera_centre(true)
+        assert np.linalg.norm(off) * units[0] < 0.05
 
 
 def test_metric_chunks_agree_on_the_middle_of_their_metres(truth):
