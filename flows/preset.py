@@ -15,6 +15,7 @@ from garden_models.targets.config import GroundTargets, ProposeTargets
 from tasks.align_gravity import AlignGravity
 from tasks.align_gravity_by_tokens import TokenGravity
 from tasks.clean_background import CleanBackground
+from tasks.clean_gaussians import CleanGaussians
 from tasks.compose import Compose
 from tasks.fuse_prediction import FusePrediction
 from tasks.ingest import Ingest
@@ -47,6 +48,7 @@ class Preset:
     place: PlaceObject = field(default_factory=PlaceObject)
     disentangle: LabelPoints = field(default_factory=LabelPoints)
     background: CleanBackground = field(default_factory=CleanBackground)
+    splats: CleanGaussians = field(default_factory=CleanGaussians)
     physics: Compose = field(default_factory=Compose)
     simulation: Simulation = field(default_factory=Simulation)
     render: RenderViews = field(default_factory=RenderViews)

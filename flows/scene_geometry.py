@@ -46,4 +46,4 @@ def background_gaussians(
     """Return the predicted Gaussians without the objects', None if none were predicted."""
     if prediction is None or not preset.geometry.gaussians:
         return None
-    return clean_gaussians(reconstruction, gravity_view, prediction, labels)
+    return clean_gaussians(reconstruction, gravity_view, prediction, labels, preset.splats)

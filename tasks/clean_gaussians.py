@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from garden_models.disentanglement.clean_gaussians_config import CleanGaussians
 from garden_models.progress import Progress, silent
 from garden_models.reconstruction.geometry_model import Gaussians, GeometryPrediction
 from garden_models.scene import GravityView, PointLabels, Reconstruction
@@ -14,9 +15,10 @@ def clean_gaussians(
     gravity_view: GravityView,
     prediction: GeometryPrediction,
     labels: tuple[PointLabels, ...],
+    config: CleanGaussians,
     progress: Progress = silent,
 ) -> Gaussians:
     """Return the Gaussians of the background in Gravity-View."""
     from garden_models.disentanglement.clean_gaussians import clean_gaussians as run
 
-    return run(reconstruction, gravity_view, prediction, labels)
+    return run(reconstruction, gravity_view, prediction, labels, config)

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool
 from scipy.spatial import cKDTree
 
+from garden_models.disentanglement.clean_gaussians_config import CleanGaussians
 from garden_models.reconstruction.geometry_model import Gaussians, GeometryPrediction
 from garden_models.reconstruction.similarity import Similarity
 from garden_models.scene import BadInput, GravityView, PointCloud, PointLabels, Reconstruction
@@ -21,8 +22,9 @@ def clean_gaussians(
     gravity_view: GravityView,
     prediction: GeometryPrediction,
     labels: Sequence[PointLabels],
+    config: CleanGaussians = CleanGaussians(),
 ) -> Gaussians:
-    """Return the Gaussians in GV (metres) that belong to no object.
+    """Return the Gaussians in GV (metres) that belong to no object, thinned.
 
     A Gaussian goes by its own mean: the labels of the fused point nearest to it decide, if that
     point is near. Raises BadInput if the prediction has no Gaussians, or labels are of another
@@ -42,9 +44,30 @@ def clean_gaussians(
     owned = np.zeros(len(points), bool)
     for label in labels:
         owned |= label.probability >= label.threshold
-    kept = cloud.subset(~_of_objects(cloud, points, owned))
+    kept = thinned(cloud.subset(~_of_objects(cloud, points, owned)), config.max_gaussians)
     gv = gravity_view.gv_from_world
     return Similarity(1.0, gv[:3, :3], gv[:3, 3]).gaussians(kept)
+
+
+def thinned(cloud: Gaussians, most: int) -> Gaussians:
+    """Return at most so many Gaussians: of those that share a cell of about their own size, a
+    surface that many photos saw alike, the most opaque.
+
+    Cells grow until few enough remain.
+    """
+    size = np.maximum(np.sort(cloud.scale, axis=1)[:, 1:].mean(axis=1), 1e-9)
+    order = np.argsort(-cloud.opacity, kind="stable")
+    factor = 1.0
+    while len(cloud.mean) > most:
+        level = np.round(np.log2(size[order] * factor)).astype(np.int64)
+        cell = np.floor(cloud.mean[order] / np.exp2(level)[:, None]).astype(np.int64)
+        _, first = np.unique(np.column_stack([level, cell]), axis=0, return_index=True)
+        if len(first) <= most:
+            keep = np.zeros(len(order), bool)
+            keep[order[first]] = True
+            return cloud.subset(keep)
+        factor *= max(1.1, (len(first) / most) ** 0.5)
+    return cloud
 
 
 def _of_objects(

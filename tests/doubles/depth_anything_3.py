@@ -153,23 +153,30 @@ class AnyView(nn.Module):
 class Nested(nn.Module):
     """The nested network: depth and cameras come in metres, Gaussians do not."""
 
-    def __init__(self, truth: TrueViews, unit: float, transposed: bool) -> None:
+    def __init__(self, truth: TrueViews, unit: float, transposed: bool, unscaled: bool) -> None:
         super().__init__()
-        self.da3, self.unit = AnyView(truth, unit, transposed), unit
+        self.da3, self.unit, self.unscaled = AnyView(truth, unit, transposed), unit, unscaled
 
     def forward(self, *args: Any, **kwargs: Any) -> dict[str, Any]:
         out = self.da3(*args, **kwargs)
         out["depth"] *= self.unit
         out["extrinsics"][..., 3] *= self.unit
-        return out | {"is_metric": 1, "scale_factor": self.unit}
+        return out | {"is_metric": 1, "scale_factor": 1.0 if self.unscaled else self.unit}
 
 
 def da3_double(
-    truth: TrueViews, nested: bool = True, unit: float = 2.5, transposed: bool = False
+    truth: TrueViews,
+    nested: bool = True,
+    unit: float = 2.5,
+    transposed: bool = False,
+    unscaled: bool = False,
 ) -> Da3Network:
-    """Return a network that answers with the truth of photos it recognises."""
+    """Return a network that answers with the truth of photos it recognises.
+
+    Broken on purpose: ``transposed`` cameras, Gaussians whose scale is ``unscaled``.
+    """
     kind = "da3nested-giant-large" if nested else "da3-giant"
-    net = Nested(truth, unit, transposed) if nested else AnyView(truth, unit, transposed)
+    net = Nested(truth, unit, transposed, unscaled) if nested else AnyView(truth, unit, transposed)
     return Da3Network(net, kind)
 
 

@@ -110,13 +110,16 @@ def test_hundreds_of_photos_are_chunked_by_the_stated_memory(truth, weights, con
             prediction_and_cameras(capture, preset_of(gpu_memory_gb=1.2))
 
 
-@pytest.mark.parametrize("broken", [{"transposed": True}])
+@pytest.mark.parametrize("broken", ["transposed", "unscaled"])
 def test_a_broken_convention_does_not_end_ok(truth, weights, context, broken):
-    put_truth(weights, truth, **broken)
-    capture, preset = capture_of(truth), preset_of()
+    put_truth(weights, truth, **{broken: True})
+    capture, preset = capture_of(truth), preset_of(gaussians=True)
     with run_context(context):
         prediction, cameras = prediction_and_cameras(capture, preset)
-        if not cameras.failed:
+        if broken == "unscaled":
+            assert prediction.status == "degraded"
+            assert "times the predicted depth" in prediction.reasons[0]
+        elif not cameras.failed:
             try:
                 assert fused_prediction(capture, cameras, prediction, preset).status != "ok"
             except StepFailed as failure:

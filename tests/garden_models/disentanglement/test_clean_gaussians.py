@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
-from garden_models.disentanglement.clean_gaussians import clean_gaussians
+from garden_models.disentanglement.clean_gaussians import clean_gaussians, thinned
 from garden_models.geometry.rotation import axis_angle, matrix_from_quaternion
-from garden_models.reconstruction.geometry_model import Gaussians, GeometryPrediction
+from garden_models.reconstruction.geometry_model import (
+    Gaussians,
+    GeometryPrediction,
+    joined_gaussians,
+)
 from garden_models.scene import (
     BadInput,
     GravityView,
@@ -74,6 +81,17 @@ def test_the_objects_gaussians_leave_and_the_others_stay(scene):
 def test_without_labels_all_stay(scene):
     reconstruction, gravity, prediction, _ = scene
     assert len(clean_gaussians(reconstruction, gravity, prediction, ()).mean) == 3800
+
+
+def test_what_many_photos_saw_alike_is_thinned_and_still_covers_the_floor(scene):
+    cloud = scene[2].gaussians
+    many = joined_gaussians([replace(cloud, opacity=cloud.opacity * f) for f in (1, 0.9, 0.8)])
+    few = thinned(many, 2000)
+    assert 800 < len(few.mean) <= 2000
+    assert thinned(many, 20_000) is many
+    nearest, _ = cKDTree(few.mean).query(cloud.mean[:3000])
+    assert np.quantile(nearest, 0.99) * UNIT < 0.1
+    assert few.opacity.min() == pytest.approx(0.9)  # the most opaque stay
 
 
 def test_what_does_not_belong_together_is_refused(scene):
