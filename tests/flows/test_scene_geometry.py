@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from flows.preset import Preset, with_settings
 from flows.scene_geometry import (
@@ -18,6 +19,9 @@ from flows.scene_geometry import (
 )
 from garden_models import foundation
 from garden_models.geometry.camera import backproject_depth
+from garden_models.gravity.decoder.checkpoint import to_bytes
+from garden_models.gravity.decoder.config import DecoderConfig
+from garden_models.gravity.decoder.network import GravityViewDecoder
 from garden_models.reconstruction import da3_photos
 from garden_models.reconstruction.geometry_model import Gaussians, GeometryPrediction
 from garden_models.scene import Capture, GravityView, Reconstruction, SparseModel
@@ -98,6 +102,27 @@ def test_photos_become_an_upright_reconstruction(truth, weights, context):
     np.testing.assert_allclose(
         np.diff(heights), np.diff(np.quantile(true, [0.01, 0.5, 0.99])), atol=0.03
     )
+
+
+def test_a_decoder_of_camera_tokens_is_one_more_cue(truth, weights, context, tmp_path):
+    decoder = DecoderConfig(
+        token_width=double.WIDTH, tokens="da3nested-giant-large", width=8, blocks=1, heads=2,
+        feature=8, head=8,
+    )  # fmt: skip
+    torch.manual_seed(0)
+    path = tmp_path / "decoder.safetensors"
+    path.write_bytes(to_bytes(GravityViewDecoder(decoder), None, None, {}))
+    preset = with_settings(preset_of(camera_tokens=True), {"token_gravity": {"weights": str(path)}})
+    with run_context(context):
+        prediction, cameras = prediction_and_cameras(capture_of(truth), preset)
+        reconstruction = fused_prediction(capture_of(truth), cameras, prediction, preset)
+        gravity = load(predicted_gravity(reconstruction, prediction, preset), GravityView)
+        without, _ = prediction_and_cameras(capture_of(truth), preset_of())
+        with pytest.raises(StepFailed, match="holds no camera tokens"):
+            predicted_gravity(reconstruction, without, preset)
+    methods = [evidence.method for evidence in gravity.evidence]
+    assert methods[0] == "camera_tokens" and "planes" in methods
+    assert not gravity.evidence[0].accepted  # it never learned anything: the others hold
 
 
 def test_hundreds_of_photos_are_chunked_by_the_stated_memory(truth, weights, context):
