@@ -23,7 +23,7 @@ from garden_models.meshing.ray_casting import Hits, RayCaster
 RAYS = 20_000
 """About how many pixels are compared."""
 
-MOST_TILT_DEG = 20.0
+MOST_TILT_DEG = 10.0
 """A model's poses are some degrees off; what leans more does not stand as it was generated."""
 
 LEAST_IOU = 0.6

@@ -91,7 +91,7 @@ def place(
     chosen, why = _gate(scored, config) if config.gate else _ungated(scored, answered)
     progress(1.0, why)
     verdict = _verdict(scored, chosen, comparison.size, masks, config)
-    verdict = verdict.worst(judge_model(answered, scored, chosen, masks.target.name, config))
+    verdict = verdict.worst(judge_model(answered, scored, chosen, masks.target.name))
     return Placement(mesh.name, scored, chosen, why, verdict)
 
 

@@ -22,7 +22,12 @@ class PromptableNetwork:
     """
 
     def __init__(
-        self, truth: TruthScene, mean: float = 0.5, std: float = 0.5, *, everything: bool = False
+        self,
+        truth: TruthScene,
+        mean: float | np.ndarray = 0.5,
+        std: float | np.ndarray = 0.5,
+        *,
+        everything: bool = False,
     ) -> None:
         self.truth, self.mean, self.std, self.everything = truth, mean, std, everything
         self.config = SimpleNamespace(prompt_encoder_config=SimpleNamespace(image_size=SIDE))
@@ -41,7 +46,8 @@ class PromptableNetwork:
         picture = np.clip(np.rint(rgb), 0, 255).astype(np.uint8)
         owner = self.truth.picture(self.truth.camera_of(picture), (SIDE, SIDE)).owner
         masks = np.stack([self._mask(owner, box) for box in boxes])
-        logits = torch.tensor(np.where(masks, 8.0, -8.0), dtype=torch.float32)[:, ::2, ::2]
+        fine = torch.tensor(np.where(masks, 8.0, -8.0), dtype=torch.float32)
+        logits = torch.nn.functional.avg_pool2d(fine, 2)
         count = len(boxes)
         return SimpleNamespace(
             pred_masks=logits[None, :, None],
