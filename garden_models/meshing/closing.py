@@ -1,9 +1,10 @@
 """Close a foreign mesh, so that it encloses a volume and has a mass.
 
-A mesh that only has its vertices doubled (along the seams of a texture) or sheets that touch
-is mended as it is. One with holes is made anew: a place is inside if most rays from it meet
-the back of a face first (Nooruddin and Turk 2003, "Simplification and repair of polygonal
-models"); the border of such places is closed, and is drawn onto the torn surface near it.
+A mesh that only has its vertices doubled (along the seams of a texture), sheets that touch or
+small holes is mended as it is. One with large holes is made anew: a place is inside if most
+rays from it meet the back of a face first (Nooruddin and Turk 2003, "Simplification and repair
+of polygonal models"); the border of such places is closed, and is drawn onto the torn surface
+near it.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from garden_models.meshing.holes import border_edges, fill_holes
 from garden_models.meshing.manifold import is_closed, separate_touching
 from garden_models.meshing.ray_casting import RayCaster
 from garden_models.meshing.surface import extract_surface
@@ -53,10 +55,11 @@ class ClosedMesh:
 
 def close_mesh(vertices: Float[np.ndarray, "v 3"], faces: Int[np.ndarray, "f 3"]) -> ClosedMesh:
     """Return the mesh closed. Raises BadGeometry if it encloses nothing."""
-    surface = _welded(np.asarray(vertices, float), np.asarray(faces, np.int64))
-    mended = separate_touching(surface)
-    if is_closed(mended.faces):
-        return ClosedMesh(_without_crumbs(_outward(mended)), remade=False)
+    surface = fill_holes(_welded(np.asarray(vertices, float), np.asarray(faces, np.int64)))
+    if not len(border_edges(surface.faces)):
+        mended = separate_touching(surface)
+        if is_closed(mended.faces):
+            return ClosedMesh(_without_crumbs(_outward(mended)), remade=False)
     return ClosedMesh(_without_crumbs(_outward(_remade(_outward(surface)))), remade=True)
 
 

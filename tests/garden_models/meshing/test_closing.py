@@ -57,6 +57,19 @@ def test_a_mesh_with_holes_is_closed_where_its_surface_ends(scale: float) -> Non
     assert result.chamfer < 0.01
 
 
+def test_small_holes_are_filled_and_all_else_stays() -> None:
+    mesh = trimesh.creation.icosphere(4, 0.2)
+    middle = mesh.triangles_center
+    kept = mesh.faces[
+        (np.linalg.norm(middle - mesh.vertices[7], axis=1) > 0.015)
+        & (np.linalg.norm(middle - mesh.vertices[900], axis=1) > 0.012)
+    ]
+    assert len(kept) < len(mesh.faces) - 5
+    found = close_mesh(mesh.vertices, kept)
+    assert not found.remade and is_closed(found.surface.faces)
+    assert signed_volume(found.surface) == pytest.approx(mesh.volume, rel=1e-3)
+
+
 def test_crumbs_are_dropped_and_a_second_piece_is_kept() -> None:
     ball = trimesh.creation.icosphere(2, 0.2)
     crumb = trimesh.creation.icosphere(1, 0.01)
