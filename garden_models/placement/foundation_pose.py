@@ -9,10 +9,8 @@ nearest upright rotation is taken.
 
 from __future__ import annotations
 
-import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -23,6 +21,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
+from garden_models.foundation.containment import first_on_path, tensors_only, usual_tensors
 from garden_models.foundation.failure import ModelFailed
 from garden_models.foundation.imports import check_files, import_code
 from garden_models.foundation.model_card import ModelCard, Terms, WeightFile
@@ -75,7 +74,7 @@ def load(weights: Path, device: str) -> EstimatePose:
     rasteriser = import_code(CARD, "nvdiffrast.torch")
     if torch.cuda.is_available():
         torch.cuda.set_device(device)
-    with _first_on_path(weights), _tensors_only(), _usual_tensors():
+    with first_on_path(weights), tensors_only(), usual_tensors():
         code = import_code(CARD, "estimater")
         _give_extension(code)
         for part, package in NEEDED.items():
@@ -116,7 +115,7 @@ class FoundationPose:
             "depth": np.ascontiguousarray(request.depth * factor, np.float32),
             "mask": np.ascontiguousarray(request.mask),
         }
-        with torch.inference_mode(), _usual_tensors():
+        with torch.inference_mode(), usual_tensors():
             estimator = self._of_mesh(request, factor)
             ask = partial(self._ask_upright, gv_from_camera=request.gv_from_camera)
             poses, scores = (ask if request.upright else self._ask_freely)(
@@ -241,37 +240,3 @@ def _give_extension(code: Any) -> None:
         with suppress(ImportError):
             built = import_module("mycpp")
             code.mycpp = built if hasattr(built, "cluster_poses") else None
-
-
-@contextmanager
-def _first_on_path(folder: Path) -> Iterator[None]:
-    """Let the model's flat modules be found; its own folder comes first."""
-    sys.path.insert(0, str(folder))
-    try:
-        yield
-    finally:
-        sys.path.remove(str(folder))
-
-
-@contextmanager
-def _tensors_only() -> Iterator[None]:
-    """Let weight files hold tensors and nothing that runs: the model asks for less care."""
-    plain = torch.load
-
-    def careful(*args: Any, **kwargs: Any) -> Any:
-        return plain(*args, **{**kwargs, "weights_only": True})
-
-    torch.load = careful
-    try:
-        yield
-    finally:
-        torch.load = plain
-
-
-@contextmanager
-def _usual_tensors() -> Iterator[None]:
-    """Undo that the model makes every new tensor of the process one on the GPU."""
-    try:
-        yield
-    finally:
-        torch.set_default_tensor_type(torch.FloatTensor)
