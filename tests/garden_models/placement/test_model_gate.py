@@ -121,6 +121,15 @@ def test_a_mesh_whose_own_pose_leans_is_placed_upright() -> None:
     assert error(placement).translation < 0.01 and error(placement).yaw_deg < 1.0
 
 
+def test_leaning_costs_as_much_as_the_setting_says() -> None:
+    leaning = moved(axis_angle(np.array([1.0, 0.0, 0.3]), np.radians(8.0)), (0.0, 0.0, 0.0))
+    totals = [
+        run(leaning, dataclasses.replace(CONFIG, tilt_weight=weight)).hypotheses[0].scores["total"]
+        for weight in (0.0, 2.0)
+    ]
+    assert totals[0] - totals[1] == pytest.approx(2.0 * 8.0 / 90.0, abs=1e-3)
+
+
 @pytest.mark.parametrize("fault", ["camera_axes", "transposed_rotation", "other_unit"])
 def test_a_broken_convention_is_not_ok(fault) -> None:
     placement = run(moved(yaw_gv(1.2), (0.05, 0.0, -0.06)), fault=fault)
