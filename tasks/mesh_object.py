@@ -53,5 +53,5 @@ def mesh_object(
         return run(reconstruction, gravity_view, masks, config, progress)
     from garden_models.meshing.completed_mesh import complete_mesh
 
-    with predictor(config.method) as predict:
+    with predictor(config.method, progress) as predict:
         return complete_mesh(reconstruction, gravity_view, masks, predict, config, progress)

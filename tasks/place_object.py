@@ -45,5 +45,5 @@ def place_object(
     scene = reconstruction, gravity_view
     if config.method == EMBEDDED:
         return place(*scene, masks, mesh, config, progress)
-    with predictor(config.method) as estimate:
+    with predictor(config.method, progress) as estimate:
         return place(*scene, masks, mesh, config, progress, estimate)

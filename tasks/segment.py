@@ -47,5 +47,5 @@ def segment(
         return run(*scene, target, rivals, config, progress)
     from garden_models.segmentation.promptable import segment_by_model
 
-    with predictor(config.method) as predict:
+    with predictor(config.method, progress) as predict:
         return segment_by_model(*scene, target, predict, rivals, config, progress)

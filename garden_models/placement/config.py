@@ -41,12 +41,12 @@ class PlaceObject:
     """Cost in mask IoU of a gap to the support as large as the object."""
 
     rotations: Literal["both", "upright", "free"] = "both"
-    """Rotations that FoundationPose may take: turns about gravity, all, or first the ones, then
-    the others. ``free`` leaves gravity out (the paper's ablation "w/o GV")."""
+    """Rotations that FoundationPose may take: turns about gravity, all, or both in turn.
+    ``free`` leaves gravity out of its hypotheses, as the paper's ablations do."""
 
     gate: bool = True
     """Whether the best of all hypotheses is taken; else FoundationPose's own best, as it is
-    (with ``rotations`` "free": the paper's ablation "full FP pose")."""
+    (with ``rotations`` "free": the paper's "full FP pose")."""
 
     iterations: int = 5
     """FoundationPose's refinements of every hypothesis."""

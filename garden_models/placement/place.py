@@ -177,22 +177,28 @@ def _headings(
 
 
 def _gate(scored: tuple[PlacementHypothesis, ...], config: PlaceObject) -> tuple[int, str]:
-    """Pick the pose with the best total; keep the mesh's own pose unless it is clearly beaten."""
+    """Pick the pose with the best total; keep the mesh's own pose unless it is clearly beaten.
+
+    If the mesh's own pose leans, that which it has when made upright is kept in its place.
+    """
     totals = np.array([hypothesis.scores["total"] for hypothesis in scored])
     best = int(totals.argmax())
-    gain = totals[best] - totals[0]
-    first = scored[0].scores
-    if best == 0 or gain < config.least_gain:
-        runner = scored[int(totals[1:].argmax()) + 1]
-        return 0, (
-            f"kept {AS_MESHED!r} (total {totals[0]:.3f}, mask IoU {first['mask_iou']:.2f}): the "
+    leans = [tilt_deg(hypothesis.rotation_gv) >= UPRIGHT_DEG for hypothesis in scored]
+    own = leans.index(False) if False in leans else 0
+    gain = totals[best] - totals[own]
+    first, name = scored[own].scores, scored[own].name
+    if best == own or gain < config.least_gain:
+        others = np.where(np.arange(len(totals)) == own, -np.inf, totals)
+        runner = scored[int(others.argmax())]
+        return own, (
+            f"kept {name!r} (total {totals[own]:.3f}, mask IoU {first['mask_iou']:.2f}): the "
             f"best of {len(scored) - 1} other poses, {runner.name!r}, reaches "
-            f"{totals[1:].max():.3f}, no gain above {config.least_gain:g}"
+            f"{others.max():.3f}, no gain above {config.least_gain:g}"
         )
     won = scored[best].scores
     return best, (
-        f"chose {scored[best].name!r}: total {totals[best]:.3f} against {totals[0]:.3f} "
-        f"{AS_MESHED!r} (mask IoU {won['mask_iou']:.2f} against {first['mask_iou']:.2f}, depth "
+        f"chose {scored[best].name!r}: total {totals[best]:.3f} against {totals[own]:.3f} "
+        f"{name!r} (mask IoU {won['mask_iou']:.2f} against {first['mask_iou']:.2f}, depth "
         f"residual {1e3 * won['depth_residual_m']:.1f} mm against "
         f"{1e3 * first['depth_residual_m']:.1f} mm, support gap "
         f"{1e3 * won['support_gap_m']:.1f} mm against {1e3 * first['support_gap_m']:.1f} mm)"

@@ -121,6 +121,13 @@ def test_a_mesh_whose_own_pose_leans_is_placed_upright() -> None:
     assert error(placement).translation < 0.01 and error(placement).yaw_deg < 1.0
 
 
+def test_of_poses_as_good_the_upright_one_is_kept() -> None:
+    leaning = moved(axis_angle(np.array([1.0, 0.0, 0.3]), np.radians(0.2)), (0.0, 0.0, 0.0))
+    placement = run(leaning)
+    assert placement.chosen != 0 and tilt_deg(placement.best.rotation_gv) < 1e-4
+    assert not any("leans" in reason for reason in placement.verdict.reasons)
+
+
 def test_leaning_costs_as_much_as_the_setting_says() -> None:
     leaning = moved(axis_angle(np.array([1.0, 0.0, 0.3]), np.radians(8.0)), (0.0, 0.0, 0.0))
     totals = [
