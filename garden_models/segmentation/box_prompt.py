@@ -36,7 +36,7 @@ def load_promptable(
         raise BadInput(f"{card.title} needs transformers with {network}: {card.install}")
     try:
         model, found = getattr(module, network).from_pretrained(
-            weights, local_files_only=True, output_loading_info=True
+            weights, local_files_only=True, output_loading_info=True, dtype=torch.float32
         )
     except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
         raise BadInput(f"{weights} does not hold {card.title}: {error}") from error

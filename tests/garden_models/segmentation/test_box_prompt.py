@@ -193,6 +193,45 @@ def test_the_tracker_loads_from_the_video_checkpoint(tmp_path: Path) -> None:
     )
 
 
+def test_sam2_loads_from_its_video_checkpoint(tmp_path: Path) -> None:
+    """The published files are of the video model: the same network with a memory."""
+    torch.manual_seed(5)
+    tiny = tiny_sam2().eval()
+    video = transformers.Sam2VideoModel(
+        transformers.Sam2VideoConfig(
+            vision_config=tiny.config.vision_config,
+            prompt_encoder_config=tiny.config.prompt_encoder_config.to_dict(),
+            mask_decoder_config=tiny.config.mask_decoder_config.to_dict(),
+            image_size=128,
+            memory_attention_hidden_size=32,
+            memory_attention_num_layers=1,
+            memory_attention_feed_forward_hidden_size=32,
+            memory_encoder_hidden_size=32,
+            memory_encoder_output_channels=16,
+            mask_downsampler_embed_dim=32,
+            memory_fuser_embed_dim=32,
+            memory_fuser_intermediate_dim=32,
+        )
+    ).eval()
+    video.save_pretrained(tmp_path)
+    answer = sam2.load(tmp_path, "cpu")(MaskRequest(photo(), BOXES))
+    same = sam2.load(tmp_path, "cpu")
+    for name, value in same._model.state_dict().items():
+        torch.testing.assert_close(value, video.state_dict()[name])
+    assert answer.masks.shape == (2, 60, 80)
+
+
+def test_weights_at_half_precision_are_read_at_full(
+    name: str, folder: Path, tmp_path: Path
+) -> None:
+    weights = load_file(folder / "model.safetensors")
+    half = {k: w.half() if w.is_floating_point() else w for k, w in weights.items()}
+    save_file(half, tmp_path / "model.safetensors", {"format": "pt"})
+    config = json.loads((folder / "config.json").read_text()) | {"dtype": "float16"}
+    (tmp_path / "config.json").write_text(json.dumps(config))
+    assert MODULES[name].load(tmp_path, "cpu")(MaskRequest(photo(), BOXES)).masks.any()
+
+
 def test_boxes_are_squeezed_as_the_published_processor_does() -> None:
     """(10, 12, 40, 50) on 80 x 60 for a square of 112: recorded from the processor."""
     found = squeezed_boxes(BOXES[:1], (80, 60), 112).numpy()[0, 0]
