@@ -54,7 +54,17 @@ class Preset:
     render: RenderViews = field(default_factory=RenderViews)
 
 
-PRESETS = {"embedded": Preset()}
+PRESETS = {
+    "embedded": Preset(),
+    "foundation": Preset(
+        geometry=PhotoGeometry("depth_anything_3", gaussians=True, camera_tokens=True),
+        segment=Segment("sam3"),
+        mesh=MeshObject("sam3d_objects"),
+        place=PlaceObject("foundation_pose"),
+    ),
+}
+"""``foundation`` is the paper's models; gravity has the model's camera tokens as one more cue
+once ``token_gravity.weights`` names a decoder of them."""
 
 
 def read_preset(name_or_file: str, settings: list[str]) -> Preset:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from flows.capture import FoundCapture, find_capture
 from flows.licence import Licence, check_licence
+from flows.model_check import check_weights
 from flows.preset import PRESETS, Preset
 from flows.scene_run import SceneRequest
 from flows.target_proposal import check_proposal, proposes, without_proposal
@@ -55,6 +56,7 @@ def read_scene(options: SceneOptions) -> SceneRequest:
     preset = options.preset if given is None else without_proposal(options.preset)
     check_proposal(preset)
     targets = given or ()
+    check_weights(preset, with_targets=bool(targets) or proposes(preset))
     if capture.sizes:
         validate(targets, capture.sizes)
     return SceneRequest(

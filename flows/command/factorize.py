@@ -9,6 +9,7 @@ from typing import Any
 from flows.command import EXIT_OF_STATUS, print_json, say
 from flows.command.scene_options import add_scene_options, scene_request
 from flows.command.store_option import open_store
+from flows.model_check import check_runnable
 from flows.scene_run import SceneResult, is_finished, plan_scene, run_scene
 from flows.step_runner import add_runner_options, step_runner
 from flows.target_proposal import check_askable
@@ -44,6 +45,8 @@ def run(options: argparse.Namespace) -> int:
         say(f"{request.name}: nothing to do, everything is in the store and {request.package}")
     else:
         check_askable(plan, planned.request.preset)
+        if not options.runner:
+            check_runnable(plan, planned.request.preset)
         result = _execute(options, planned, store)
         document = _write_report(result, store)
     _tell(document, request.package, time.monotonic() - started)

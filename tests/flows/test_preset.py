@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from flows.licence import models_of
 from flows.preset import Preset, read_preset
 from garden_models.physics.config import ITERATIONS, TIMESTEP
 from garden_models.scene import BadInput
@@ -45,3 +46,22 @@ def test_a_wrong_setting_says_what_there_is(setting: str, message: str) -> None:
 def test_an_unknown_preset_names_the_known_ones() -> None:
     with pytest.raises(BadInput, match="embedded"):
         read_preset("fancy", [])
+
+
+def test_foundation_is_the_papers_models() -> None:
+    models = ("depth_anything_3", "sam3", "sam3d_objects", "foundation_pose")
+    assert models_of(read_preset("foundation", [])) == models
+
+
+def test_foundation_with_single_steps_changed_back(tmp_path: Path) -> None:
+    path = tmp_path / "mixed.toml"
+    path.write_text('preset = "foundation"\n[mesh]\nmethod = "fusion"\n')
+    mixed = read_preset(str(path), ["place.method=render_and_compare", "segment.method=sam2"])
+    assert models_of(mixed) == ("depth_anything_3", "sam2")
+    assert mixed.mesh == Preset().mesh
+    assert mixed.place == Preset().place
+
+
+def test_a_model_in_the_wrong_step_is_an_error() -> None:
+    with pytest.raises(BadInput, match=r"segment\.method must be one of"):
+        read_preset("foundation", ["segment.method=sam3d_objects"])
