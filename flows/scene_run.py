@@ -83,7 +83,7 @@ def run_scene(
     check_writable(request.package)
     budget = budget or Budget.of_machine()
     context = _context(request, store, engine, events, budget, elsewhere, postponed)
-    with _models_loaded_once(request, elsewhere):
+    with _models_loaded_once(request, budget, elsewhere):
         if engine == "local":
             return _run(request, context)
         from flows.prefect_flow import PrefectProgress, scene_flow
@@ -94,14 +94,16 @@ def run_scene(
 
 
 @contextmanager
-def _models_loaded_once(request: SceneRequest, elsewhere: Elsewhere) -> Iterator[None]:
+def _models_loaded_once(
+    request: SceneRequest, budget: Budget, elsewhere: Elsewhere
+) -> Iterator[None]:
     """Have the scene's steps ask their models of one keeper, if they ask any on this machine."""
     if elsewhere is not None or not models_of(request.preset):
         yield
         return
     from tasks.model.keeper_process import is_wanted, model_keeper
 
-    with model_keeper() if is_wanted() else nullcontext():
+    with model_keeper(budget) if is_wanted() else nullcontext():
         yield
 
 

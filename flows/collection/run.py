@@ -263,7 +263,7 @@ class _Runner:
         if not is_wanted():
             yield
             return
-        with model_keeper() as self._costs:
+        with model_keeper(self._budget) as self._costs:
             self._environment |= kept_by()
             try:
                 yield

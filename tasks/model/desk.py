@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from garden_models.scene import BadInput
 from tasks.model.launch import Launch
 from tasks.model.tally import Tally
 from tasks.model.turn import MOST_OVERTAKEN, next_turn, overtake
@@ -185,6 +186,8 @@ class Place:
         self._unload()
         gpu = None
         if self._device.startswith("cuda"):
+            if not self._budget.gpus:
+                raise BadInput(f"{question.launch.name} runs on a GPU, and this run may use none")
             held = self._slot.enter_context(self._budget.hold(_GPU, question.gone))
             gpu = ",".join(held.gpus)
         self._worker = ModelWorker(question.launch, gpu)

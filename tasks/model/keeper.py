@@ -1,8 +1,9 @@
-"""Keep models loaded for many processes: ``python -m tasks.model.keeper SOCKET PARENT``.
+"""Keep models loaded for many processes: ``python -m tasks.model.keeper SOCKET PARENT BUDGET``.
 
-``SOCKET`` is the descriptor of a Unix socket that listens. Each connection speaks JSON lines
-(docs/model_workers.md) and is a user of at most one model at a time; a process that goes away
-takes its question with it. The keeper and its workers die with the process that started it.
+``SOCKET`` is the descriptor of a Unix socket that listens, ``BUDGET`` a budget's JSON. Each
+connection speaks JSON lines (docs/model_workers.md) and is a user of at most one model at a
+time; a process that goes away takes its question with it. The keeper and its workers die with
+the process that started it.
 """
 
 from __future__ import annotations
@@ -34,7 +35,10 @@ def main() -> None:
     os.set_inheritable(descriptor, False)
     signal.signal(signal.SIGTERM, lambda _number, _frame: sys.exit(0))
     sweep()
-    desk = Desk(Budget.of_machine())
+    budget = Budget.from_json(json.loads(sys.argv[3]))
+    if len(budget.cores) < (os.cpu_count() or 1):
+        budget.confine()
+    desk = Desk(budget)
     try:
         serve(socket.socket(fileno=descriptor), desk)
     finally:

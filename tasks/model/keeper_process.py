@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import signal
 import socket
@@ -18,6 +19,7 @@ from typing import Any
 from garden_models.foundation.failure import ModelFailed
 from tasks.model.keeper_client import VARIABLE, KeeperClient
 from tasks.model.tally import added
+from tasks.step.budget import Budget
 from tasks.step.slots import runtime_folder
 
 ByModel = dict[str, dict[str, Any]]
@@ -44,14 +46,16 @@ def is_wanted() -> bool:
 
 
 @contextmanager
-def model_keeper() -> Iterator[Costs]:
+def model_keeper(budget: Budget | None = None) -> Iterator[Costs]:
     """Have all processes that are started inside ask their models of one keeper.
 
-    One that dies is started again. It ends with this process, and its workers with it. The
-    last costs are known afterwards too.
+    It uses the cores and GPUs of ``budget``, of the machine if none is given. One that dies is
+    started again. It ends with this process, and its workers with it. The last costs are known
+    afterwards too.
     """
     before = os.environ.get(VARIABLE)
-    kept = _Kept(runtime_folder() / f"keeper-{uuid.uuid4().hex[:12]}.sock")
+    address = runtime_folder() / f"keeper-{uuid.uuid4().hex[:12]}.sock"
+    kept = _Kept(address, budget or Budget.of_machine())
     os.environ[VARIABLE] = str(kept.address)
     try:
         yield kept.costs
@@ -67,8 +71,9 @@ def model_keeper() -> Iterator[Costs]:
 class _Kept:
     """The keeper's socket, and the thread that keeps a keeper on it."""
 
-    def __init__(self, address: Path) -> None:
+    def __init__(self, address: Path, budget: Budget) -> None:
         self.address = address
+        self._budget = json.dumps(budget.to_json())
         self._socket = socket.socket(socket.AF_UNIX)
         self._socket.bind(str(address))
         address.chmod(0o600)
@@ -117,9 +122,9 @@ class _Kept:
 
     def _start(self) -> subprocess.Popen[bytes]:
         descriptor = self._socket.fileno()
-        command = [sys.executable, "-m", "tasks.model.keeper", str(descriptor), str(os.getpid())]
+        words = ["-m", "tasks.model.keeper", str(descriptor), str(os.getpid()), self._budget]
         return subprocess.Popen(
-            command,
+            [sys.executable, *words],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             pass_fds=(descriptor,),

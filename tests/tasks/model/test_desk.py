@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import threading
 from collections.abc import Callable, Iterator
@@ -116,6 +117,17 @@ def test_an_error_leaves_the_place_to_others(models: Path, open_desk: Callable[.
     cost = desk.tally.to_json()
     assert (cost["doubler"]["calls"], cost["doubler"]["failures"]) == (0, 1)
     assert (cost["tripler"]["calls"], cost["tripler"]["loads"]) == (1, 1)
+
+
+def test_a_run_that_may_use_no_gpu_is_told(
+    models: Path, budget: Budget, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", GPU)
+    settings(device="cuda")
+    desk = Desk(dataclasses.replace(budget, gpus=()))
+    with pytest.raises(BadInput, match="doubler runs on a GPU, and this run may use none"):
+        ask(desk, launch_of("doubler"))
+    desk.close()
 
 
 @pytest.mark.parametrize(
