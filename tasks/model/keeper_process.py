@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -27,6 +28,8 @@ ByModel = dict[str, dict[str, Any]]
 
 Costs = Callable[[], ByModel]
 """Returns what each model cost so far."""
+
+_JUST_MADE_S = 60.0
 
 GRACE_S = 5.0
 """How long a keeper may take to end its workers."""
@@ -54,6 +57,7 @@ def model_keeper(budget: Budget | None = None) -> Iterator[Costs]:
     afterwards too.
     """
     before = os.environ.get(VARIABLE)
+    sweep_sockets(runtime_folder())
     address = runtime_folder() / f"keeper-{uuid.uuid4().hex[:12]}.sock"
     kept = _Kept(address, budget or Budget.of_machine())
     os.environ[VARIABLE] = str(kept.address)
@@ -66,6 +70,18 @@ def model_keeper(budget: Budget | None = None) -> Iterator[Costs]:
         else:
             os.environ[VARIABLE] = before
         kept.end()
+
+
+def sweep_sockets(folder: Path) -> None:
+    """Remove the sockets of keepers whose processes were killed."""
+    for path in folder.glob("keeper-*.sock"):
+        with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX) as trial:
+            if time.time() - path.stat().st_mtime < _JUST_MADE_S:
+                continue
+            try:
+                trial.connect(str(path))
+            except ConnectionRefusedError:
+                path.unlink()
 
 
 class _Kept:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -21,7 +22,7 @@ from garden_models.scene import BadInput
 from storage import Store
 from tasks.model import predictor
 from tasks.model.keeper_client import KeeperClient, keeper_address
-from tasks.model.keeper_process import Costs, model_keeper
+from tasks.model.keeper_process import Costs, model_keeper, sweep_sockets
 from tasks.model.resident import residents
 from tasks.step import RunContext, Step, StepFailed, run_context
 from tests.tasks.model.doubler import loads
@@ -218,6 +219,20 @@ def test_a_keeper_that_dies_is_started_again(models: Path, keeper: Costs) -> Non
     cost = keeper()["doubler"]
     assert (cost["loads"], cost["calls"]) == (2, 2)
     assert cost["peak_gb"] < 1
+
+
+def test_sockets_of_the_killed_are_swept_and_of_the_living_are_not(tmp_path: Path) -> None:
+    dead, young = tmp_path / "keeper-1.sock", tmp_path / "keeper-2.sock"
+    for path in (dead, young):
+        with socket.socket(socket.AF_UNIX) as killed:
+            killed.bind(str(path))
+    with socket.socket(socket.AF_UNIX) as living:
+        living.bind(str(tmp_path / "keeper-3.sock"))
+        living.listen()
+        for name in ("keeper-1.sock", "keeper-3.sock"):
+            os.utime(tmp_path / name, (1e9, 1e9))
+        sweep_sockets(tmp_path)
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["keeper-2.sock", "keeper-3.sock"]
 
 
 PARENT = """
