@@ -40,6 +40,10 @@ def keeper_address() -> Path | None:
     return Path(given) if given and given != OFF else None
 
 
+class KeeperGone(ModelFailed):
+    """There is no keeper, or it went away; another one may be there already."""
+
+
 class KeeperClient:
     """A connection to the keeper. While it lasts, the keeper counts on more questions."""
 
@@ -135,6 +139,6 @@ def _after(seconds: float) -> Callable[[], bool]:
     return lambda: time.monotonic() > deadline
 
 
-def _gone(error: OSError | None) -> ModelFailed:
+def _gone(error: OSError | None) -> KeeperGone:
     why = f" ({error.strerror})" if error is not None and error.strerror else ""
-    return ModelFailed(f"{KEEPER} is gone{why}: start the run again")
+    return KeeperGone(f"{KEEPER} is gone{why}: start the run again")

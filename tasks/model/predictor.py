@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from garden_models.progress import AS_BEFORE, Progress, silent
 from tasks.model.checked import check_answer
-from tasks.model.keeper_client import KeeperClient, keeper_address
+from tasks.model.keeper_client import KeeperClient, KeeperGone, keeper_address
 from tasks.model.launch import launch_of
 from tasks.model.resident import residents
 from tasks.model_worker.nouns import nouns_of
@@ -50,8 +52,36 @@ def _asking() -> Iterator[Callable[..., Any]]:
     if address is None:
         yield residents.ask
         return
-    client = KeeperClient(address)
+    asking = _ThroughKeeper(address)
     try:
-        yield client.ask
+        yield asking.ask
     finally:
-        client.close()
+        asking.close()
+
+
+class _ThroughKeeper:
+    """A connection to the keeper; a new one, once for each question, to one that came after it."""
+
+    def __init__(self, address: Path) -> None:
+        self._address = address
+        self._guard = threading.Lock()
+        self._client = KeeperClient(address)
+
+    def ask(self, *question: Any) -> Any:
+        """Return the answer."""
+        client = self._client
+        try:
+            return client.ask(*question)
+        except KeeperGone:
+            return self._next(client).ask(*question)
+
+    def _next(self, gone: KeeperClient) -> KeeperClient:
+        with self._guard:  # of several threads the first one connects
+            if self._client is gone:
+                gone.close()
+                self._client = KeeperClient(self._address)
+            return self._client
+
+    def close(self) -> None:
+        """Hang up."""
+        self._client.close()

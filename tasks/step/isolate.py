@@ -152,6 +152,8 @@ def _rebuild(error: dict[str, Any]) -> Exception:
         return store_error(message)
     if kind == "MemoryError":
         return MemoryError(message)
+    if kind == "KeeperGone":
+        return failure.ModelFailed(message)
     if kind in ("ModelFailed", "ModelOutOfMemory"):
         model_error: type[Exception] = getattr(failure, kind)
         return model_error(message)
