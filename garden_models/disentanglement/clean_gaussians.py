@@ -15,6 +15,8 @@ from garden_models.scene import BadInput, GravityView, PointCloud, PointLabels, 
 
 REACH = 4.0
 """An object claims Gaussians up to this many times the spacing of its points away."""
+FINEST = 0.1
+"""Cells that thin Gaussians are at first this share of their size."""
 
 
 def clean_gaussians(
@@ -57,7 +59,7 @@ def thinned(cloud: Gaussians, most: int) -> Gaussians:
     """
     size = np.maximum(np.sort(cloud.scale, axis=1)[:, 1:].mean(axis=1), 1e-9)
     order = np.argsort(-cloud.opacity, kind="stable")
-    factor = 1.0
+    factor = FINEST
     while len(cloud.mean) > most:
         level = np.round(np.log2(size[order] * factor)).astype(np.int64)
         cell = np.floor(cloud.mean[order] / np.exp2(level)[:, None]).astype(np.int64)
