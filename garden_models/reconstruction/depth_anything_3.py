@@ -129,10 +129,13 @@ def _check(network: Da3Network, request: GeometryRequest) -> None:
     if request.want_gaussians and not network.gaussians:
         raise BadInput(
             f"{network.kind} here predicts no Gaussians: they need da3-giant or "
-            f"da3nested-giant-large, and the packages {' and '.join(GAUSSIAN_IMPORTS)}"
+            f"da3nested-giant-large, and the packages {' and '.join(GAUSSIAN_IMPORTS)}; or ask for "
+            "none (geometry.gaussians = false)"
         )
     if request.want_tokens and not network.poses:
-        raise BadInput(f"{network.kind} has no camera tokens")
+        raise BadInput(
+            f"{network.kind} has no camera tokens: ask for none (geometry.camera_tokens = false)"
+        )
 
 
 def _tensor(array: np.ndarray, network: Da3Network) -> torch.Tensor:

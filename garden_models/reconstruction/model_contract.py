@@ -26,7 +26,8 @@ def check_request(request: GeometryRequest, model: str, extras: bool = False) ->
             raise BadInput(f"{len(given)} of {name} for {len(request.photos)} photos")
     if (request.want_tokens or request.want_gaussians) and not extras:
         raise BadInput(
-            f"{model} predicts neither camera tokens nor Gaussians: use depth_anything_3"
+            f"{model} predicts neither camera tokens nor Gaussians: use depth_anything_3, or ask "
+            "for none (geometry.gaussians and geometry.camera_tokens = false)"
         )
 
 
