@@ -93,6 +93,8 @@ def test_its_colours_are_the_models_also_where_no_photo_saw_it(textured: bool) -
     assert np.median(off[mesh.observed]) < 10 and np.median(off[~mesh.observed]) < 10
     assert 0.2 < mesh.observed.mean() < 0.9
     assert any("texture" in line for line in mesh.completion) == textured
+    missed = next(line for line in mesh.completion if "of 255" in line)
+    assert float(missed.split(" by ")[1].split(" of ")[0]) < 8
 
 
 def test_a_mesh_with_holes_is_closed_anew_and_that_is_said() -> None:
