@@ -22,6 +22,7 @@ MODULES = {
     "normal_clustering": "garden_models.gravity.normal_clustering",
     "manhattan_frame": "garden_models.gravity.manhattan_frame",
     "mean_camera_up": "garden_models.gravity.mean_camera_up",
+    "reference_camera": "garden_models.gravity.reference_camera",
     "view_decoder": "garden_models.gravity.view_decoder",
 }
 """Whole names, so that a step's key sees which code it reaches."""
