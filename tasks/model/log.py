@@ -6,6 +6,7 @@ import logging
 import os
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
+from typing import TextIO
 
 from storage.user_folders import cache_folder
 
@@ -27,12 +28,28 @@ def model_log(name: str) -> logging.Logger:
 
 
 def _open(root: logging.Logger) -> None:
-    file = log_file()
-    file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    handler = RotatingFileHandler(file, maxBytes=_BYTES, backupCount=_OLDER, delay=True)
-    handler.setFormatter(logging.Formatter(f"%(asctime)s {os.getpid()} %(name)s %(message)s"))
     for old in root.handlers:
         old.close()
-    root.handlers[:] = [handler]
+    root.handlers[:] = [_handler(log_file())]
     root.setLevel(logging.INFO)
     root.propagate = False
+
+
+def _handler(file: Path) -> logging.Handler:
+    """Return what writes to a file; to standard error where the file cannot be written."""
+    handler: logging.Handler
+    try:
+        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        handler = RotatingFileHandler(file, maxBytes=_BYTES, backupCount=_OLDER)
+    except OSError:
+        handler = _ToStandardError(str(file))
+    handler.setFormatter(logging.Formatter(f"%(asctime)s {os.getpid()} %(name)s %(message)s"))
+    return handler
+
+
+class _ToStandardError(logging.StreamHandler[TextIO]):
+    """Stands in for a file that cannot be written."""
+
+    def __init__(self, file: str) -> None:
+        super().__init__()
+        self.baseFilename = file

@@ -72,6 +72,7 @@ def test_each_model_is_loaded_once_and_each_step_runs_once(home: Path) -> None:
     assert [(c["loads"], c["calls"]) for c in costs.values()] == [(1, 6), (1, 12)]
 
 
+@pytest.mark.slow
 def test_who_reads_the_state_is_told_of_the_models(home: Path) -> None:
     batch(home, orders(home, a="", b=""))
     state = state_of(home)
@@ -82,6 +83,7 @@ def test_who_reads_the_state_is_told_of_the_models(home: Path) -> None:
     assert line in _lines(state)
 
 
+@pytest.mark.slow
 def test_in_waves_the_first_scenes_finish_before_the_last_ones_begin(
     home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -92,6 +94,7 @@ def test_in_waves_the_first_scenes_finish_before_the_last_ones_begin(
     assert loaded(home) == (2, 2)
 
 
+@pytest.mark.slow
 def test_a_scene_that_fails_leaves_the_others_alone(home: Path) -> None:
     result = batch(home, orders(home, a="fails early", b="", c="fails late", d=""))
     rows = rows_of(result)
@@ -103,6 +106,7 @@ def test_a_scene_that_fails_leaves_the_others_alone(home: Path) -> None:
     assert rows["c"].executed == 4
 
 
+@pytest.mark.slow
 def test_a_rerun_starts_no_keeper_and_loads_nothing(home: Path) -> None:
     scenes = orders(home, **SCENES)
     batch(home, scenes)
@@ -111,6 +115,7 @@ def test_a_rerun_starts_no_keeper_and_loads_nothing(home: Path) -> None:
     assert loaded(home) == (1, 1)
 
 
+@pytest.mark.slow
 def test_what_is_in_the_store_is_not_waited_for(home: Path) -> None:
     """Only a step that has to run ends a pass."""
     batch(home, orders(home, a="", b=""))
@@ -121,6 +126,7 @@ def test_what_is_in_the_store_is_not_waited_for(home: Path) -> None:
     assert sorted(ran(home))[:3] == ["double a", "double b", "double c"]
 
 
+@pytest.mark.slow
 def test_a_batch_that_is_stopped_between_two_passes_goes_on_from_there(
     home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

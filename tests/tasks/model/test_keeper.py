@@ -94,6 +94,7 @@ def test_processes_share_what_is_loaded(models: Path, keeper: Costs) -> None:
     assert cost["peak_gb"] > 0.01
 
 
+@pytest.mark.slow
 def test_who_asks_the_loaded_model_goes_first(models: Path, keeper: Costs) -> None:
     """Many at once ask two models in turn on one device; each is loaded a few times at most."""
 
@@ -108,6 +109,7 @@ def test_who_asks_the_loaded_model_goes_first(models: Path, keeper: Costs) -> No
     assert loads(models / "doubler") + loads(models / "tripler") <= 6
 
 
+@pytest.mark.slow
 def test_a_model_in_use_is_kept_between_two_questions(models: Path, keeper: Costs) -> None:
     """Another model's question waits while the first asker is only computing for a moment."""
     with predictor("doubler") as double:
@@ -144,6 +146,7 @@ def test_errors_come_back_typed_and_cost_one_question(
     assert keeper()["doubler"]["calls"] + keeper()["doubler"]["failures"] == 3
 
 
+@pytest.mark.slow
 def test_a_client_that_is_killed_lets_the_others_go_on(models: Path, keeper: Costs) -> None:
     hanging = client("doubler", how="hang")
     wait_for(lambda: loads(models / "doubler") == 1)

@@ -153,6 +153,13 @@ def test_the_memory_limit_holds_and_can_be_reacted_to(apart: Path, store: Store)
         assert predict(Question(np.ones((4, 2)))).values.shape == (4, 2)
 
 
+QUICK = {"version", "garbage", "other question", "changed member", "other noun"}
+
+
+def slow_but(how: str) -> list[pytest.MarkDecorator]:
+    return [] if how in QUICK else [pytest.mark.slow]
+
+
 LIES = {
     "version": "speaks garden.worker/99, and this GARDEN garden.worker/1",
     "greeting": "does not keep to the protocol: it wrote hello, I am a program",
@@ -179,7 +186,7 @@ LIES = {
 }
 
 
-@pytest.mark.parametrize("how", LIES)
+@pytest.mark.parametrize("how", [pytest.param(how, marks=slow_but(how)) for how in LIES])
 def test_a_worker_that_lies_is_found_out(models: Path, store: Store, how: str) -> None:
     settings(python=[sys.executable, liar.__file__, how], time_limit_s=60)
     with run_context(RunContext(store, "room", workers=1)):
