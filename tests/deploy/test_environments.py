@@ -26,7 +26,7 @@ each_recipe = pytest.mark.parametrize("recipe", RECIPES, ids=NAMES)
 
 def requirements(recipe: Path) -> list[str]:
     lines = (recipe / "requirements.txt").read_text().splitlines()
-    return [line for line in lines if line and not line.startswith(("#", "--"))]
+    return [line for line in lines if line and not line.startswith("#")]
 
 
 def distributions(recipe: Path) -> set[str]:
@@ -60,6 +60,9 @@ def test_everything_is_pinned(recipe: Path) -> None:
     assert base is not None
     assert PINNED.match(base[1])
     for name, value in re.findall(r"^ARG (\w+)=(\S+)$", text, re.MULTILINE):
+        if name in ("TORCH_INDEX", "KAOLIN_LINKS"):
+            assert value == '""', "where packages come from is for who builds"
+            continue
         assert re.fullmatch(r"[0-9a-f]{40}|v[0-9.]+", value), name
     for url in re.findall(r"(?:git\+)?https://github\.com/\S+", text):
         assert "${" in url, f"{url} names no commit"
