@@ -193,9 +193,9 @@ class Sam3Tracker(PromptableNetwork):
 
     @classmethod
     def from_pretrained(
-        cls, weights: Path, local_files_only: bool, output_loading_info: bool
+        cls, weights: Path, local_files_only: bool, output_loading_info: bool, dtype: torch.dtype
     ) -> tuple[Sam3Tracker, dict[str, list[str]]]:
-        assert local_files_only and output_loading_info
+        assert local_files_only and output_loading_info and dtype == torch.float32
         fault = json.loads((weights / "config.json").read_text())["fault"]
         network = cls(corner_scene(), everything=fault == "everything")
         return network, {"missing_keys": [], "mismatched_keys": []}
