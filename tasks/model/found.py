@@ -42,14 +42,13 @@ class FoundModel:
 
 
 def found_model(name: str) -> FoundModel:
-    """Return what there is of a model; a model of which nothing is there is ``absent``."""
+    """Return what there is of a model; one without a folder of weights is ``absent``."""
     card = foundation.card(name)
     try:
         settings = model_settings(name)
     except BadInput as error:
         return FoundModel(card, "broken", None, None, card.terms, "", "", "", (str(error),))
     problems = list(_missing_code(card, settings))
-    has_code = not problems
     digest = device = ""
     try:
         digest = digest_value(weights_of(name), domain="model weights")[:_DIGITS]
@@ -60,10 +59,9 @@ def found_model(name: str) -> FoundModel:
     except BadInput as error:
         problems.append(str(error))
     variant = variant_of(card, settings.weights)
-    nothing = not has_code and not digest
     return FoundModel(
         card=card,
-        state="ready" if not problems else "absent" if nothing else "broken",
+        state="ready" if not problems else "broken" if settings.weights.exists() else "absent",
         weights=settings.weights,
         variant=variant,
         terms=card.terms_of(variant),
