@@ -23,11 +23,19 @@ def first_on_path(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def tensors_only() -> Iterator[None]:
-    """Let ``torch.load`` read tensors and nothing that runs, whatever the code asks for."""
+    """Let ``torch.load`` read tensors and nothing that runs, whatever the code asks for.
+
+    A file that holds more, or is damaged, is a ValueError.
+    """
     plain = torch.load
 
     def careful(*args: Any, **kwargs: Any) -> Any:
-        return plain(*args, **{**kwargs, "weights_only": True})
+        try:
+            return plain(*args, **{**kwargs, "weights_only": True})
+        except (OSError, MemoryError):
+            raise
+        except Exception as error:
+            raise ValueError(f"a weight file cannot be read as tensors: {error}") from error
 
     torch.load = careful
     try:

@@ -14,7 +14,6 @@ from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from pickle import UnpicklingError
 from typing import Any
 
 import numpy as np
@@ -82,7 +81,7 @@ def load(weights: Path, device: str) -> EstimatePose:
                 raise BadInput(f"{CARD.title} works only with {package}: {CARD.install}")
         try:
             refiner, scorer = code.PoseRefinePredictor(), code.ScorePredictor()
-        except (OSError, RuntimeError, KeyError, UnpicklingError) as error:
+        except (OSError, RuntimeError, KeyError, ValueError) as error:
             raise BadInput(f"{weights} does not hold {CARD.title}: {error}") from error
         return FoundationPose(code, refiner, scorer, rasteriser.RasterizeCudaContext())
 
