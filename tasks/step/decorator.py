@@ -185,7 +185,7 @@ def step(
         memory_gb: resident memory that it needs at its peak, by measurement.
         gpus: how many GPUs it needs for itself.
         here: compute where the run was started, never on another machine: the step reads
-            the user's files.
+            the user's files, or asks a server with the user's key.
 
     A run with a budget starts the step when its cores, memory and GPUs are free.
     """

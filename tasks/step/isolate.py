@@ -79,7 +79,8 @@ def _child(folder: Path, order: dict[str, Any], gpus: tuple[str, ...]) -> Iterat
     reading, writing = os.pipe()
     output = folder / "output.txt"
     (folder / "order.json").write_text(json.dumps(order))
-    command = [sys.executable, "-m", "tasks.step.child"]
+    # Unbuffered: what a child that crashes printed last is often why.
+    command = [sys.executable, "-u", "-m", "tasks.step.child"]
     command += [str(writing), str(os.getpid()), str(folder / "order.json")]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     if gpus:

@@ -58,6 +58,6 @@ def test_plain_arguments_survive(step: Step) -> None:
         assert canonical(again, domain="t") == canonical(value, domain="t")
 
 
-def test_what_reads_the_users_files_stays_where_they_are() -> None:
+def test_what_reads_the_users_files_or_keys_stays_where_they_are() -> None:
     here = {step.name for step in STEPS if step.spec.here}
-    assert here == {"ingest", "extract_gravity_tokens"}
+    assert here == {"ingest", "extract_gravity_tokens", "propose_targets", "check_targets"}
