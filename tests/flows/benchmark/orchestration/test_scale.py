@@ -70,14 +70,19 @@ def orders_that_fail(scenes: int, objects: int) -> list[JobOrder]:
     return [JobOrder(f"scene_{n:06}", job, {"number": n}) for n in (1,)]
 
 
-def measured(cpu_s: list[float], ours_mb: list[int], restart_s: float = 1.0) -> ScaleResult:
+def measured(
+    cpu_s: list[float],
+    ours_mb: list[int],
+    restart_s: float = 1.0,
+    scene_s: list[float] | None = None,
+) -> ScaleResult:
     """Return a run in which scene ``i`` ended at second ``i + 1``, with one sample a second."""
     spent = [0.0, *accumulate(cpu_s)]
     samples = [
         Sample(i + 0.5, Usage(1.0, 50 * MB, 1), Usage(spent[i], (mb - 50) * MB, 2), Usage(0, 0, 0))
         for i, mb in enumerate(ours_mb)
     ]
-    finished = [FinishedScene(i + 1.0, 2.0) for i in range(len(cpu_s))]
+    finished = [FinishedScene(i + 1.0, s) for i, s in enumerate(scene_s or [2.0] * len(cpu_s))]
     options = ScaleOptions(len(cpu_s), 5, "local")
     restart = Restart(restart_s, 0, options.steps)
     store = {"objects": Growth(10, 5, 1000, 4096), "actions": Growth(2, 1, 100, 4096)}
@@ -92,11 +97,13 @@ def test_the_last_block_is_held_against_the_first() -> None:
     claims = scale_sections(result)[0].claims
     assert all(claim.holds for claim in claims)
     slower = scale_sections(measured([1.0] * 300 + [1.3] * 100, [100] * 400))[0].claims
-    assert [claim.holds for claim in slower] == [False, True, True, True, True]
+    assert [claim.holds for claim in slower] == [True, False, True, True, True, True]
+    later = measured([1.0] * 400, [100] * 400, scene_s=[1.0] * 300 + [1.3] * 100)
+    assert [c.holds for c in scale_sections(later)[0].claims] == [False] + [True] * 5
     larger = scale_sections(measured([1.0] * 400, [100] * 300 + [130] * 100))[0].claims
-    assert [claim.holds for claim in larger] == [True, False, True, True, True]
+    assert [claim.holds for claim in larger] == [True, True, False, True, True, True]
     late = scale_sections(measured([1.0] * 400, [100] * 400, restart_s=61.0))[0].claims
-    assert [claim.holds for claim in late] == [True, True, False, True, True]
+    assert [claim.holds for claim in late] == [True, True, True, False, True, True]
 
 
 def test_few_scenes_make_four_blocks() -> None:
