@@ -58,9 +58,7 @@ class FolderMedium:
     def create(self, name: str, data: bytes) -> bool:
         """Make a durable document at once; False if the name is taken."""
         target = self.path / name
-        with staging.staging_folder(self.path, durable=False) as staged:
-            draft = staged / target.name
-            _os.active.write(draft, data)
+        with staging.staged_file(self.path, data) as draft:
             _os.active.chmod(draft, 0o444)
             if self.durable:
                 _os.active.fsync(draft)
@@ -76,9 +74,7 @@ class FolderMedium:
     def replace(self, name: str, data: bytes) -> None:
         """Make or change a document at once."""
         target = self.path / name
-        with staging.staging_folder(self.path, durable=False) as staged:
-            draft = staged / target.name
-            _os.active.write(draft, data)
+        with staging.staged_file(self.path, data) as draft:
             _os.ensure_folder(target.parent, durable=False)
             _os.active.rename(draft, target)
 
@@ -265,7 +261,7 @@ class FolderMedium:
         if not self._swept:
             self._swept = True
             staging.sweep(self.path)
-        with staging.staging_folder(self.path, durable=False) as folder:
+        with staging.staging_folder(self.path) as folder:
             yield folder
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from storage import _os, locks
 from storage.leases import LEASE_S, Accepts, Lease, LeaseTable, lease_name
-from storage.staging import own_name
+from storage.staging import staged_file
 
 
 class FolderLeases(LeaseTable):
@@ -23,13 +23,11 @@ class FolderLeases(LeaseTable):
 
     def _create(self, lease: Lease) -> bool:
         _os.ensure_folder(self._store / "leases", durable=False)
-        draft = self._draft(lease)
-        try:
-            _os.active.link(draft, self._store / lease_name(lease.key))
-        except FileExistsError:
-            return False
-        finally:
-            _os.active.unlink(draft)
+        with staged_file(self._store, lease.to_bytes()) as draft:
+            try:
+                _os.active.link(draft, self._store / lease_name(lease.key))
+            except FileExistsError:
+                return False
         return True
 
     def _exchange(self, key: str, accepts: Accepts, new: Lease | None) -> bool:
@@ -39,7 +37,8 @@ class FolderLeases(LeaseTable):
             if not accepts(current):
                 return False
             if new is not None:
-                _os.active.rename(self._draft(new), place)
+                with staged_file(self._store, new.to_bytes()) as draft:
+                    _os.active.rename(draft, place)
             else:
                 with suppress(FileNotFoundError):
                     _os.active.unlink(place)
@@ -50,13 +49,6 @@ class FolderLeases(LeaseTable):
             return Lease.from_bytes((self._store / lease_name(key)).read_bytes())
         except (FileNotFoundError, ValueError):
             return None
-
-    def _draft(self, lease: Lease) -> Path:
-        drafts = self._store / "tmp"
-        _os.ensure_folder(drafts, durable=False)
-        draft = drafts / f"{own_name()}.lease"
-        _os.active.write(draft, lease.to_bytes())
-        return draft
 
     def _locked(self) -> AbstractContextManager[None]:
         folder = self._store / "leases"

@@ -49,21 +49,28 @@ class Owner:
 def own_mark() -> str:
     """Return a short mark of this process, for names of files that may hold nothing yet."""
     pid = os.getpid()
-    return f"{_place_mark()}-{pid}-{_start_ticks(pid)}"
+    return "-".join([*_place_marks(), str(pid), str(_start_ticks(pid))])
 
 
 def is_dead_mark(mark: str) -> bool:
     """Tell whether ``mark`` is one of ``own_mark`` whose process is surely gone."""
-    place, _, process = mark.partition("-")
-    pid, _, started = process.partition("-")
-    if place != _place_mark() or not (pid.isdecimal() and started.isdecimal()):
+    try:
+        host, boot, space, pid, started = mark.split("-")
+        process = int(pid), int(started)
+    except ValueError:
         return False
-    return _start_ticks(int(pid)) != int(started)
+    own_host, own_boot, own_space = _place_marks()
+    if boot != own_boot:
+        return host == own_host
+    return space == own_space and _start_ticks(process[0]) != process[1]
 
 
 @functools.cache
-def _place_mark() -> str:
-    return digest_bytes("/".join(_place()).encode())[3:15]
+def _place_marks() -> tuple[str, str, str]:
+    boot_id, pid_space = _place()
+    names = socket.gethostname(), boot_id, pid_space
+    host, boot, space = (digest_bytes(name.encode())[3:11] for name in names)
+    return host, boot, space
 
 
 @functools.cache

@@ -1,10 +1,12 @@
-"""Write new things where nobody looks yet, and clear up after the dead."""
+"""Write new things where nobody looks yet, and clear up after the dead.
+
+Everything here is one entry of ``store/tmp`` whose name says whose it is. What is published
+leaves it by one rename, so that nothing has to be removed: a file system that has just freed
+many inodes takes longer to find the next one.
+"""
 
 from __future__ import annotations
 
-import dataclasses
-import json
-import os
 import time
 import uuid
 from collections.abc import Iterator
@@ -12,66 +14,70 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from storage import _os
-from storage.owner import Owner, is_dead_mark, own_mark
+from storage.owner import is_dead_mark, own_mark
 
-OWNER_FILE = "owner.json"
 _ABANDONED_AFTER_S = 24 * 3600.0  # when the owner cannot be asked (another machine's)
 
 
 @contextmanager
-def staging_folder(store: Path, *, durable: bool) -> Iterator[Path]:
-    """Give an empty folder below ``store/tmp``, marked with its owner; remove it at the end."""
-    parent = store / "tmp"
-    _os.ensure_folder(parent, durable=durable)
-    outer = parent / own_name()
-    _os.active.mkdir(outer)
+def staging_folder(store: Path) -> Iterator[Path]:
+    """Give an empty folder below ``store/tmp``; remove it at the end if it is still there."""
+    folder = _place(store)
+    _os.active.mkdir(folder)
     try:
-        owner = json.dumps(dataclasses.asdict(Owner.here())).encode()
-        _os.active.write(outer / OWNER_FILE, owner)
-        inner = outer / "stage"
-        _os.active.mkdir(inner)
-        yield inner
+        yield folder
     except BaseException:
         # What went wrong is what the caller must hear of; ``sweep`` removes what is left.
         with suppress(OSError):
-            _os.remove_tree(outer)
+            _os.remove_tree(folder)
         raise
-    _os.remove_tree(outer)
+    _os.remove_tree(folder)
 
 
-def own_name() -> str:
+@contextmanager
+def staged_file(store: Path, data: bytes) -> Iterator[Path]:
+    """Give a file below ``store/tmp``; remove it at the end if it is still there."""
+    draft = _place(store)
+    try:
+        _os.active.write(draft, data)
+        yield draft
+    except BaseException:
+        with suppress(OSError):
+            _os.active.unlink(draft)
+        raise
+    with suppress(FileNotFoundError):
+        _os.active.unlink(draft)
+
+
+def _place(store: Path) -> Path:
     """Return a new name that says whose it is before anything is in it."""
-    return f"{uuid.uuid4().hex}-{own_mark()}"
+    folder = store / "tmp"
+    _os.ensure_folder(folder, durable=False)
+    return folder / f"{uuid.uuid4().hex}-{own_mark()}"
 
 
 def sweep(store: Path) -> int:
-    """Remove staging folders whose owner is dead or unknown for a day; return how many."""
+    """Remove what belongs to a dead process, or is unknown for a day; return how much."""
     parent = store / "tmp"
     if not parent.is_dir():
         return 0
     swept = 0
-    for entry in os.scandir(parent):
-        if not _abandoned(Path(entry.path)):
+    for entry in list(parent.iterdir()):
+        if not _abandoned(entry):
             continue
-        if entry.is_dir(follow_symlinks=False):
-            _os.remove_tree(Path(entry.path))
+        if entry.is_dir() and not entry.is_symlink():
+            _os.remove_tree(entry)
         else:
             with suppress(FileNotFoundError):  # another one sweeps, too
-                _os.active.unlink(Path(entry.path))
+                _os.active.unlink(entry)
         swept += 1
     return swept
 
 
-def _abandoned(folder: Path) -> bool:
-    if is_dead_mark(folder.stem.partition("-")[2]):
+def _abandoned(entry: Path) -> bool:
+    if is_dead_mark(entry.name.partition("-")[2]):
         return True
     try:
-        owner = Owner(**json.loads((folder / OWNER_FILE).read_bytes()))
-    except (OSError, ValueError, TypeError):
-        owner = None
-    if owner is not None and owner.is_dead():
-        return True
-    try:
-        return time.time() - folder.stat().st_mtime > _ABANDONED_AFTER_S
+        return time.time() - entry.lstat().st_mtime > _ABANDONED_AFTER_S
     except FileNotFoundError:
         return False

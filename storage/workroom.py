@@ -18,7 +18,7 @@ def folder() -> Iterator[Path]:
     """Give an empty folder in the system's temporary folder; remove it at the end."""
     room = _room()
     staging.sweep(room)
-    with staging.staging_folder(room, durable=False) as place:
+    with staging.staging_folder(room) as place:
         yield place
 
 

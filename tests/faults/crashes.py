@@ -82,8 +82,9 @@ def damaged_object(store: Store) -> None:
 
 
 def pin_and_compact(store: Store) -> None:
-    store.unpin("held")
-    store.pin("held", scenes=["good"])
+    for name in ("held", "too"):
+        store.unpin(name)
+        store.pin(name, scenes=["good"])
     store.compact()
 
 
