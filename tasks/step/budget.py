@@ -23,7 +23,7 @@ from tasks.step.ref import Cancelled
 from tasks.step.slots import Ticket, runtime_folder
 
 MEMORY_SLOT_GB = 0.5
-_POLL_S = (0.01, 0.2)
+_POLL_S = 0.2
 
 
 @dataclass(frozen=True)
@@ -154,11 +154,10 @@ def is_holding() -> bool:
 
 
 def _wait(ticket: Ticket, cancelled: threading.Event) -> None:
-    pause = _POLL_S[0]
     while not ticket.try_take():
-        if cancelled.wait(pause):
+        ticket.wait(_POLL_S)
+        if cancelled.is_set():
             raise Cancelled("the run was stopped")
-        pause = min(1.5 * pause, _POLL_S[1])
 
 
 def _within(count: int, least: int, most: int, what: str) -> int:

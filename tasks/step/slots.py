@@ -3,15 +3,18 @@
 A slot is taken by locking its file (``flock``), so that there is no state to repair: a
 process that is killed gives back all that it held. Who wants slots queues with a ticket,
 a locked file too. Slots are looked at and taken under one gate, all or none, so that no two
-wait for each other.
+wait for each other. Whoever gives slots back rings for those in the queue (named pipes), so
+that nobody sleeps beside a free slot.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import json
 import os
+import select
 import stat
 import tempfile
 import time
@@ -24,6 +27,8 @@ from garden_models.scene import BadInput
 
 PATIENCE_S = 20.0
 """How long smaller requests may overtake a larger one; then slots are kept for it."""
+
+_RINGS = 4096
 
 Request = Mapping[str, int]
 """How many slots of each kind."""
@@ -55,53 +60,73 @@ class Ticket:
         self._held: list[int] = []
         self.slots: dict[str, tuple[str, ...]] = {}
         self._paper: int | None = None
+        self._bell: int | None = None
         self._name = f"{time.monotonic_ns():020d}-{uuid.uuid4().hex}"
         (folder / "waiting").mkdir(exist_ok=True)
+        (folder / "bells").mkdir(exist_ok=True)
 
     def try_take(self) -> bool:
         """Take all slots of the request, or none; queue if they are not free."""
         with _gate(self._folder):
-            free = {kind: self._free(kind) for kind in self._request}
-            if all(len(free[k]) >= n for k, n in self._request.items()) and self._may_go(free):
-                self._take(free)
-                self._leave_queue()
-                return True
-            _close(descriptor for found in free.values() for descriptor, _ in found)
-            self._enter_queue()
-        return False
+            found = self._find()
+            if found is None:
+                self._enter_queue()
+                return False
+            self._take(found)
+            self._leave_queue()
+            return True
+
+    def wait(self, seconds: float) -> None:
+        """Wait until somebody gives slots back, but not longer than ``seconds``.
+
+        One whose owner is killed does not ring: try again after a while.
+        """
+        assert self._bell is not None, "only who is in the queue waits"
+        if select.select([self._bell], [], [], seconds)[0]:
+            os.read(self._bell, _RINGS)
 
     def give_back(self) -> None:
         """Free the slots, or leave the queue."""
         _close(self._held)
         self._held = []
-        self._leave_queue()
+        with _gate(self._folder):
+            self._leave_queue()
+            _ring(self._folder / "bells")
 
-    def _free(self, kind: str) -> list[tuple[int, str]]:
-        """Lock all free slots of a kind; give their descriptors and names.
+    def _find(self) -> dict[str, list[tuple[int, str]]] | None:
+        """Lock what is asked for, and as much again as is kept for those who waited long
+        enough; None if there is not so much.
+        """
+        waiting = list(self._waiting_long())
+        found: dict[str, list[tuple[int, str]]] = {}
+        for kind, count in self._request.items():
+            kept = max((other.get(kind, 0) for other in waiting), default=0)
+            found[kind] = self._free(kind, count + kept)
+            if len(found[kind]) < count + kept:
+                _close(descriptor for slots in found.values() for descriptor, _ in slots)
+                return None
+        return found
+
+    def _free(self, kind: str, most: int) -> list[tuple[int, str]]:
+        """Lock free slots of a kind; give their descriptors and names.
 
         The last ones come first: who has a smaller budget uses only the first ones.
         """
-        found = []
+        found: list[tuple[int, str]] = []
         for name in reversed(self._pool[kind]):
+            if len(found) == most:
+                break
             descriptor = _locked(self._folder / f"{kind}-{name}")
             if descriptor is not None:
                 found.append((descriptor, name))
         return found
 
-    def _take(self, free: dict[str, list[tuple[int, str]]]) -> None:
-        for kind, found in free.items():
-            taken = found[: self._request[kind]]
+    def _take(self, found: dict[str, list[tuple[int, str]]]) -> None:
+        for kind, slots in found.items():
+            taken = slots[: self._request[kind]]
             self._held += [descriptor for descriptor, _ in taken]
             self.slots[kind] = tuple(name for _, name in taken)
-            _close(descriptor for descriptor, _ in found[self._request[kind] :])
-
-    def _may_go(self, free: dict[str, list[tuple[int, str]]]) -> bool:
-        """Tell whether this would not keep slots from somebody who waited long enough."""
-        for other in self._waiting_long():
-            for kind, count in self._request.items():
-                if len(free[kind]) - count < other.get(kind, 0):
-                    return False
-        return True
+            _close(descriptor for descriptor, _ in slots[self._request[kind] :])
 
     def _waiting_long(self) -> Iterator[Request]:
         """Give the requests that came before this one and lost their patience."""
@@ -122,12 +147,30 @@ class Ticket:
             path = self._folder / "waiting" / self._name
             self._paper = _locked(path)
             path.write_text(json.dumps(self._request))
+            bell = self._folder / "bells" / self._name
+            os.mkfifo(bell, 0o600)
+            self._bell = os.open(bell, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
 
     def _leave_queue(self) -> None:
-        if self._paper is not None:
-            (self._folder / "waiting" / self._name).unlink(missing_ok=True)
-            os.close(self._paper)
-            self._paper = None
+        for folder, descriptor in (("waiting", self._paper), ("bells", self._bell)):
+            if descriptor is not None:
+                (self._folder / folder / self._name).unlink(missing_ok=True)
+                os.close(descriptor)
+        self._paper = self._bell = None
+
+
+def _ring(bells: Path) -> None:
+    """Wake all in the queue; remove the bells of the dead. To be called behind the gate."""
+    for path in bells.iterdir():
+        try:
+            descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        except OSError as error:
+            if error.errno == errno.ENXIO:  # nobody listens any more
+                path.unlink(missing_ok=True)
+            continue
+        with contextlib.suppress(BlockingIOError):  # it has been rung for often enough
+            os.write(descriptor, b"!")
+        os.close(descriptor)
 
 
 @contextmanager

@@ -19,6 +19,7 @@ import pytest
 
 from storage import Store
 from tasks.step import Budget, Need, StepFailed, slots, step
+from tasks.step import budget as budget_module
 from tasks.step.machine import usable_cores, usable_memory_gb
 from tasks.step.ref import Cancelled
 from tests.tasks.step.toy import Numbers, Scaling, apart, fan, in_run, make, spins
@@ -153,6 +154,33 @@ def test_a_ticket_of_a_dead_process_keeps_nobody_waiting(
     monkeypatch.setattr(slots, "PATIENCE_S", 0.0)
     with shared.hold(Need(1), threading.Event()):
         assert list((shared.folder / "waiting").iterdir()) == []
+
+
+def test_who_waits_is_woken_as_soon_as_slots_are_free(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(budget_module, "_POLL_S", 600.0)
+    shared = budget(tmp_path / "slots")
+    with ThreadPoolExecutor(3) as pool:
+        with shared.hold(Need("all"), threading.Event()):
+            waiting = [pool.submit(take_and_give_back, shared) for _ in range(3)]
+            until(lambda: len(list((shared.folder / "bells").iterdir())) == 3)
+        for one in waiting:
+            one.result(timeout=60)
+    assert list((shared.folder / "bells").iterdir()) == []
+
+
+def take_and_give_back(shared: Budget) -> None:
+    with shared.hold(Need(1), threading.Event()):
+        pass
+
+
+def test_the_bell_of_a_dead_process_is_taken_down(tmp_path: Path) -> None:
+    shared = budget(tmp_path / "slots")
+    (shared.folder / "bells").mkdir()
+    os.mkfifo(shared.folder / "bells" / f"{0:020d}-gone")
+    take_and_give_back(shared)
+    assert list((shared.folder / "bells").iterdir()) == []
 
 
 def test_a_step_that_asks_for_more_than_there_is_gets_all_of_it(tmp_path: Path) -> None:
