@@ -7,8 +7,8 @@ import os
 import threading
 import time
 import uuid
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
 os.environ.setdefault("PREFECT_SERVER_ANALYTICS_ENABLED", "false")
@@ -18,9 +18,14 @@ os.environ.setdefault("PREFECT_LOGGING_LEVEL", "CRITICAL")
 os.environ.setdefault("PREFECT_CLIENT_MAX_RETRIES", "8")
 
 import httpx
-from prefect import Flow, flow, tags
+from prefect import flow, tags
 from prefect.artifacts import create_progress_artifact, update_progress_artifact
 from prefect.context import TagsContext
+from prefect.settings import (
+    PREFECT_FLOWS_HEARTBEAT_FREQUENCY,
+    get_current_settings,
+    temporary_settings,
+)
 from prefect.task_runners import ThreadPoolTaskRunner
 
 from tasks.step import StepEvent, step_name
@@ -31,13 +36,17 @@ MAX_TASKS = 8
 PROGRESS_EVERY_S = 2.0
 """Each update of Prefect's page is a request to its server."""
 
+_DEPLOYED_RUN = "PREFECT__FLOW_RUN_ID"
 
-def scene_flow(scene: str) -> Callable[[Callable[..., Any]], Flow[..., Any]]:
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+def scene_flow(scene: str) -> Decorator:
     """Return the decorator that makes a function the flow run of ``scene``."""
     return _flow("factorize-scene", scene)
 
 
-def collection_flow(collection: str) -> Callable[[Callable[..., Any]], Flow[..., Any]]:
+def collection_flow(collection: str) -> Decorator:
     """Return the decorator that makes a function the flow run of ``collection``."""
     return _flow("factorize-collection", collection)
 
@@ -47,7 +56,7 @@ def of_collection(collection: str) -> AbstractContextManager[Any]:
     return tags(f"collection:{collection}")
 
 
-def _flow(name: str, run_name: str) -> Callable[[Callable[..., Any]], Flow[..., Any]]:
+def _flow(name: str, run_name: str) -> Decorator:
     as_flow = flow(
         name=name,
         flow_run_name=run_name.replace("{", "(").replace("}", ")"),
@@ -55,7 +64,33 @@ def _flow(name: str, run_name: str) -> Callable[[Callable[..., Any]], Flow[..., 
         validate_parameters=False,
         persist_result=False,
     )
-    return lambda function: as_flow(_with_untagged_tasks(function))
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        run = as_flow(_with_untagged_tasks(function))
+
+        @functools.wraps(function)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            with _heartbeats_if_heard():
+                return run(*args, **kwargs)
+
+        return call
+
+    return decorate
+
+
+@contextmanager
+def _heartbeats_if_heard() -> Iterator[None]:
+    """Send heartbeats only if somebody set how often, or a worker of a deployment began this.
+
+    A flow run that sends them takes up to a second longer to end; what hears them is the
+    automation that marks the runs of machines that are gone, which would block a deployment.
+    """
+    current = get_current_settings()
+    if "heartbeat_frequency" in current.flows.model_fields_set or _DEPLOYED_RUN in os.environ:
+        yield
+        return
+    with temporary_settings({PREFECT_FLOWS_HEARTBEAT_FREQUENCY: None}):
+        yield
 
 
 def _with_untagged_tasks(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -15,9 +15,19 @@ from flows.preset import Preset
 from flows.step_runner import AT_ONCE_ELSEWHERE, Elsewhere
 from garden_models.scene import Target
 from storage import Store
+from storage.codec.ahead import import_codec_meanwhile
 from storage.formats.package import check_writable, package_source
 from tasks.ingest import CaptureSource
-from tasks.step import Budget, PlanEntry, Ref, RunContext, StepEvent, StepFailed, run_context
+from tasks.step import (
+    Budget,
+    PlanEntry,
+    Ref,
+    RunContext,
+    SpareChild,
+    StepEvent,
+    StepFailed,
+    run_context,
+)
 
 
 @dataclass(frozen=True)
@@ -83,14 +93,32 @@ def run_scene(
     check_writable(request.package)
     budget = budget or Budget.of_machine()
     context = _context(request, store, engine, events, budget, elsewhere, postponed)
-    with _models_loaded_once(request, budget, elsewhere):
-        if engine == "local":
-            return _run(request, context)
-        from flows.prefect_flow import PrefectProgress, scene_flow
+    import_codec_meanwhile()
+    with _spare_child(context), _models_loaded_once(request, budget, elsewhere):
+        return _run(request, context) if engine == "local" else _run_as_flow(request, context)
 
-        context.events = PrefectProgress(events)
+
+@contextmanager
+def _spare_child(context: RunContext) -> Iterator[None]:
+    """Have a child process ready for the run's isolated steps, if they run on this machine."""
+    if context.elsewhere is not None:
+        yield
+        return
+    with closing(SpareChild(context.store)) as context.spare:
+        context.spare.prepare()
+        yield
+
+
+def _run_as_flow(request: SceneRequest, context: RunContext) -> SceneResult:
+    from flows.prefect_server import at_server, begin_server
+
+    begin_server()
+    from flows.prefect_flow import PrefectProgress, scene_flow
+
+    context.events = PrefectProgress(context.events)
+    with at_server():
         result: SceneResult = scene_flow(request.name)(_run)(request, context)
-        return result
+    return result
 
 
 @contextmanager

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from flows.collection.prefect_server import server_address
 from flows.prefect_flow import collection_flow, of_collection
+from flows.prefect_server import at_server
 
 
 def in_collection_flow(name: str, body: Callable[[], None], environment: dict[str, str]) -> None:
@@ -13,12 +13,10 @@ def in_collection_flow(name: str, body: Callable[[], None], environment: dict[st
 
     ``environment`` is that of the processes which it starts: they are told the server.
     """
-    from prefect.settings import PREFECT_API_URL, temporary_settings
 
     def run() -> None:
         body()
 
-    address = server_address()
-    environment["PREFECT_API_URL"] = address
-    with temporary_settings({PREFECT_API_URL: address}), of_collection(name):
+    with at_server() as address, of_collection(name):
+        environment["PREFECT_API_URL"] = address
         collection_flow(name)(run)()

@@ -27,6 +27,7 @@ from tasks.step.ref import (
     step_name,
 )
 from tasks.step.run import RunContext, current_run, load, run_context, step_scratch
+from tasks.step.start_child import SpareChild
 from tasks.step.submit import fan_out
 
 __all__ = [
@@ -39,6 +40,7 @@ __all__ = [
     "Ref",
     "RunContext",
     "Seconds",
+    "SpareChild",
     "Step",
     "StepEvent",
     "StepFailed",

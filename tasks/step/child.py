@@ -1,7 +1,8 @@
-"""Compute one isolated step: ``python -m tasks.step.child PIPE PARENT ORDER``.
+"""Compute one isolated step: ``python -m tasks.step.child PIPE PARENT``.
 
-``ORDER`` is a JSON file (``tasks.step.isolate``); answers are JSON lines on descriptor ``PIPE``.
-What libraries print goes to the standard streams and never into the answers.
+The order is a JSON line on standard input (``tasks.step.isolate``), which may come long after the
+start, or never; answers are JSON lines on descriptor ``PIPE``. What libraries print goes to
+the standard streams and never into the answers.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ import json
 import os
 import sys
 import traceback
-from pathlib import Path
 from typing import Any
 
 from tasks.parent_process import Answers, die_with
@@ -19,20 +19,42 @@ from tasks.parent_process import Answers, die_with
 
 def main() -> None:
     """Do what the order says."""
-    descriptor, parent, order_file = int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3])
+    descriptor, parent = int(sys.argv[1]), int(sys.argv[2])
     die_with(parent)
     os.set_inheritable(descriptor, False)
     answers = Answers(descriptor)
     try:
-        answers.send({"done": obey(json.loads(order_file.read_text()), answers)})
+        import_ahead()
+        order = sys.stdin.readline()
+        if not order:
+            return
+        leave_input()
+        answers.send({"done": obey(json.loads(order), answers)})
     except Exception as error:
         answers.send({"error": describe(error)})
         raise SystemExit(1) from error
 
 
+def import_ahead() -> None:
+    """Import what every order needs, while there is none yet."""
+    import tasks.step.compute
+    import tasks.step.order  # noqa: F401
+    from storage.codec.ahead import import_codec
+
+    import_codec()
+
+
+def leave_input() -> None:
+    """Have libraries that read from standard input find nothing there."""
+    with open(os.devnull) as nothing:  # noqa: PTH123
+        os.dup2(nothing.fileno(), sys.stdin.fileno())
+
+
 def obey(order: dict[str, Any], answers: Answers) -> dict[str, Any]:
     """Compute and publish; return the parts of ``Done`` as JSON."""
     sys.path[:] = order["path"]
+    if order["gpus"]:
+        os.environ["CUDA_VISIBLE_DEVICES"] = ",".join(order["gpus"])
     from tasks.step.compute import compute
     from tasks.step.order import open_store, read_order
     from tasks.step.run import RunContext, run_context

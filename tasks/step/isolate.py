@@ -7,13 +7,8 @@ memory, or the run is stopped, and it dies with its parent.
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from garden_models import scene
@@ -25,6 +20,7 @@ from tasks.step.inputs import Arguments
 from tasks.step.order import write_order
 from tasks.step.ref import Cancelled, MemoryLimit, Seconds, StepCrashed, TimeLimit
 from tasks.step.run import RunContext
+from tasks.step.start_child import start_child
 
 if TYPE_CHECKING:
     from tasks.step import Step
@@ -60,9 +56,13 @@ def compute_isolated(
         BadInput, BadGeometry, MemoryError, OSError, StoreError, ModelFailed: as raised in
             the child.
     """
-    order = write_order(context, step, arguments, label) | {"path": sys.path}
-    with context.store.scratch() as folder, _child(folder, order, gpus) as child:
+    order = write_order(context, step, arguments, label) | {"path": sys.path, "gpus": gpus}
+    started = start_child(context.store) if context.spare is None else context.spare.take()
+    try:
+        child = started.obey(order)
         answer = _listen(context, step, child, report)
+    finally:
+        started.end()
     if "error" in answer:
         raise _rebuild(answer["error"])
     done = answer["done"]
@@ -72,38 +72,6 @@ def compute_isolated(
         Seconds(**done["seconds"]),
         max(child.peak.mb, done["peak_mb"]),
     )
-
-
-@contextmanager
-def _child(folder: Path, order: dict[str, Any], gpus: tuple[str, ...]) -> Iterator[ChildProcess]:
-    reading, writing = os.pipe()
-    output = folder / "output.txt"
-    (folder / "order.json").write_text(json.dumps(order))
-    # Unbuffered: what a child that crashes printed last is often why.
-    command = [sys.executable, "-u", "-m", "tasks.step.child"]
-    command += [str(writing), str(os.getpid()), str(folder / "order.json")]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    if gpus:
-        environment["CUDA_VISIBLE_DEVICES"] = ",".join(gpus)
-    try:
-        with output.open("wb") as printed:
-            process = subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=printed,
-                stderr=subprocess.STDOUT,
-                pass_fds=(writing,),
-                start_new_session=True,
-                env=environment,
-            )
-    finally:
-        os.close(writing)
-    child = ChildProcess(process, reading, output)
-    try:
-        yield child
-    finally:
-        child.kill()
-        os.close(reading)
 
 
 def _listen(

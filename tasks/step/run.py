@@ -18,6 +18,7 @@ from typing import Any, Literal, TypeVar
 from storage import Store, StoreError
 from tasks.step.budget import Budget
 from tasks.step.ref import PendingValue, PlanEntry, Ref, StepEvent
+from tasks.step.start_child import SpareChild
 
 Engine = Literal["prefect", "local", "plan"]
 T = TypeVar("T")
@@ -38,7 +39,8 @@ class RunContext:
     ``isolate=False`` runs isolated steps in this process (for tests). Without ``budget``
     steps wait for nobody. ``elsewhere`` computes calls that are not in the store on other
     machines (``tasks.step.dask_runner``). ``postponed`` names steps that are not run here: a call
-    that is not in the store raises Postponed. ``outcomes`` and ``plan`` are filled as steps finish.
+    that is not in the store raises Postponed. ``spare`` has a child ready for the next isolated
+    step. ``outcomes`` and ``plan`` are filled as steps finish.
     """
 
     store: Store
@@ -55,6 +57,7 @@ class RunContext:
     cancelled: threading.Event = field(default_factory=threading.Event)
     elsewhere: Callable[[Any], Ref] | None = None
     postponed: frozenset[str] = frozenset()
+    spare: SpareChild | None = None
     producers: dict[str, Callable[[str], Ref]] = field(default_factory=dict)
     _guard: threading.RLock = field(default_factory=threading.RLock)
     _pin: str = ""

@@ -1,6 +1,7 @@
-"""Start a Prefect server for one batch: ``python -m`` this module with SOCKET and PARENT.
+"""Start a Prefect server for one program: ``python -m`` this module with SOCKET and PARENT.
 
-Prefect's own temporary server outlives a killed batch; this one dies with it.
+Prefect's own temporary server outlives a program that is killed, and is waited for; this one dies
+with it, and starts while the program does other things.
 """
 
 from __future__ import annotations
@@ -12,12 +13,45 @@ import os
 import socket
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 from flows.server_profile import SERVER_PROFILES
 from tasks.parent_process import die_with
 
 START_S = 180.0
+
+
+def begin_server() -> None:
+    """Start this process' own server already if one will be needed; return at once.
+
+    Call it before Prefect is imported, which takes about as long.
+    """
+    if not _may_be_configured() and threading.current_thread() is threading.main_thread():
+        _begun_server()
+
+
+def _may_be_configured() -> bool:
+    if "prefect" in sys.modules:
+        from prefect.settings import PREFECT_API_URL
+
+        return bool(PREFECT_API_URL.value())
+    home = Path(os.environ.get("PREFECT_HOME", Path.home() / ".prefect"))
+    profiles = Path(os.environ.get("PREFECT_PROFILES_PATH", home / "profiles.toml"))
+    return "PREFECT_API_URL" in os.environ or profiles.exists()
+
+
+@contextmanager
+def at_server() -> Iterator[str]:
+    """Have Prefect's client in this context speak to ``server_address``; give it."""
+    from prefect.settings import PREFECT_API_URL, temporary_settings
+
+    address = server_address()
+    with temporary_settings({PREFECT_API_URL: address}):
+        yield address
 
 
 def server_address() -> str:
@@ -34,6 +68,13 @@ def server_address() -> str:
 
 @functools.cache
 def _own_server() -> str:
+    address, process = _begun_server()
+    _wait_for(address, process)
+    return address
+
+
+@functools.cache
+def _begun_server() -> tuple[str, subprocess.Popen[bytes]]:
     with socket.socket() as listening:
         listening.bind(("127.0.0.1", 0))
         listening.listen(128)
@@ -48,8 +89,7 @@ def _own_server() -> str:
         )
         address = f"http://127.0.0.1:{listening.getsockname()[1]}/api"
     _started.append(process)
-    _wait_for(address, process)
-    return address
+    return address, process
 
 
 _started: list[subprocess.Popen[bytes]] = []
@@ -80,7 +120,7 @@ def _wait_for(address: str, process: subprocess.Popen[bytes]) -> None:
 
 
 def main() -> None:
-    """Serve on the socket until the batch ends."""
+    """Serve on the socket until the program ends."""
     descriptor, parent = int(sys.argv[1]), int(sys.argv[2])
     die_with(parent)
     settings = {"PREFECT_SERVER_ANALYTICS_ENABLED": "false"} | SERVER_PROFILES["lean"]
