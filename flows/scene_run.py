@@ -29,6 +29,9 @@ from tasks.step import (
     run_context,
 )
 
+AT_ONCE_A_CORE = 2
+"""Targets that are on their way: while one waits for a core, another one's step runs."""
+
 
 @dataclass(frozen=True)
 class SceneRequest:
@@ -150,7 +153,7 @@ def _context(
         engine=engine,
         events=events,
         force=request.force,
-        workers=max(2, len(budget.cores)) if elsewhere is None else AT_ONCE_ELSEWHERE,
+        workers=AT_ONCE_A_CORE * len(budget.cores) if elsewhere is None else AT_ONCE_ELSEWHERE,
         budget=budget,
         elsewhere=elsewhere,
         postponed=postponed,

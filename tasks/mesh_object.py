@@ -36,7 +36,6 @@ def _weights(config: MeshObject, **_others: object) -> dict[str, str]:
     ),
     backend=_backend,
     weights=_weights,
-    cores="all",
     memory_gb=1.5,
 )
 def mesh_object(
