@@ -108,7 +108,8 @@ def run_collection(
         WrongUse: an unknown name, another batch in the same folder.
         KeyboardInterrupt: stopped by Ctrl-C or SIGTERM; the state says so.
     """
-    orders = [scene_order(request) for request in collection.scenes]
+    here = runner.name is None
+    orders = [scene_order(request, models_here=here) for request in collection.scenes]
     options = Options(engine, scenes_at_once, tuple(only), keep_going, budget, runner)
     return run_jobs(collection, orders, store_address, options, on_event)
 

@@ -11,8 +11,10 @@ from typing import Any
 from flows.collection.job import JobOrder, JobRun, Report
 from flows.collection.passes import stops_of
 from flows.licence import models_of
+from flows.model_check import check_runnable
 from flows.preset import Preset
 from flows.scene_run import SceneRequest, is_finished, plan_scene, run_scene
+from flows.target_proposal import check_askable
 from garden_models.scene import Target
 from storage import Store
 from tasks.ingest import CaptureSource
@@ -29,14 +31,24 @@ _PLAIN: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class SceneJob:
-    """Plan and factorize one scene and write its package."""
+    """Plan and factorize one scene and write its package.
+
+    ``models_here`` says whether the models that it asks run on this machine.
+    """
 
     request: SceneRequest
+    models_here: bool = True
 
     def plan(self, store: Store) -> Report | None:
-        """Return the row of a finished scene, whose package is left as it is."""
+        """Return the row of a finished scene, whose package is left as it is.
+
+        Raises BadInput if what has to run would ask a model that cannot be asked.
+        """
         planned, plan = plan_scene(self.request, store)
         if not is_finished(plan, planned):
+            check_askable(plan, self.request.preset)
+            if self.models_here:
+                check_runnable(plan, self.request.preset)
             return None
         document = json.loads((self.request.package / "report.json").read_bytes())
         return scene_report(document, self.request.package) | {"executed": 0, "cached": len(plan)}
@@ -59,12 +71,13 @@ class SceneJob:
         return scene_report(write_scene_package(result, store), self.request.package)
 
 
-def scene_order(request: SceneRequest) -> JobOrder:
+def scene_order(request: SceneRequest, *, models_here: bool = True) -> JobOrder:
     """Return the order that makes a scene's job in a worker."""
     arguments: dict[str, Any] = {
         name: plain_to_json(getattr(request, name)) for name in ("name", *_PLAIN)
     }
     arguments |= {"package": str(request.package), "force": sorted(request.force)}
+    arguments["models_here"] = models_here
     return JobOrder(
         request.name,
         "flows.collection.scene_job:scene_job",
@@ -74,7 +87,9 @@ def scene_order(request: SceneRequest) -> JobOrder:
     )
 
 
-def scene_job(name: Any, package: str, force: list[str], **plain: Any) -> SceneJob:
+def scene_job(
+    name: Any, package: str, force: list[str], models_here: bool, **plain: Any
+) -> SceneJob:
     """Make the job that ``scene_order`` describes."""
     values = {key: plain_from_json(plain[key], hint) for key, hint in _PLAIN.items()}
     return SceneJob(
@@ -83,7 +98,8 @@ def scene_job(name: Any, package: str, force: list[str], **plain: Any) -> SceneJ
             package=Path(package),
             force=frozenset(force),
             **values,
-        )
+        ),
+        models_here,
     )
 
 

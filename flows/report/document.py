@@ -196,16 +196,27 @@ def _objects(values: SceneValues) -> list[Json]:
             )
         else:
             reason = failed[target.name][1].reason if target.name in failed else "not reached"
+            earlier = _doubts(values.result, target.name)
             documents.append(
                 {
                     "name": target.name,
                     "photo": target.photo,
                     "box": list(target.box),
                     "status": "failed",
-                    "reasons": [reason],
+                    "reasons": [reason, *earlier],
                 }
             )
     return documents
+
+
+def _doubts(result: SceneResult, target: str) -> list[str]:
+    """Return what the steps that did come out said of a target: often why a later one failed."""
+    return [
+        f"{event.step}: {reason}"
+        for event in result.outcomes
+        if event.label == target and event.status == "degraded"
+        for reason in event.reasons
+    ]
 
 
 def _object(values: ObjectValues, motion: BodyMotion | None, body: Any) -> Json:

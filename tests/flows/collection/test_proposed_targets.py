@@ -13,6 +13,7 @@ from flows.collection.scene_job import SceneJob, scene_order
 from flows.command import main
 from flows.proposal_options import ProposalOptions
 from flows.scene_run import SceneRequest
+from storage import Store
 from tests.flows.collection.test_definition import make_capture, write
 
 BOXES = {"targets": [{"name": "mug", "image": "0.png", "box": [1, 2, 30, 40]}]}
@@ -74,6 +75,27 @@ def test_a_worker_gets_the_same_options(home: Path) -> None:
         made = type(order)(order.name, order.job, arguments).make()
         assert isinstance(made, SceneJob)
         assert made.request == wanted
+
+
+def test_a_missing_key_is_told_before_any_work(
+    home: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("GEMINI_API_KEY", "GOOGLE_API_KEY"):
+        monkeypatch.delenv(name, raising=False)
+    captures, store = str(home / "captures"), str(home / "store")
+    arguments = ["batch", captures, "--out", str(home / "out"), "--store", store, "--json"]
+    arguments += ["--engine", "local", "--propose", "gemini-4"]
+    assert main(arguments) == 1
+    scenes = {scene["name"]: scene for scene in json.loads(capsys.readouterr().out)["scenes"]}
+    assert {scene["status"] for scene in scenes.values()} == {"failed"}
+    assert "GEMINI_API_KEY" in scenes["hall"]["reasons"][0]
+    assert list(Store.open(store).actions()) == []
+
+
+def test_models_of_other_machines_are_not_looked_for_here(home: Path) -> None:
+    wanted = read_collection(write(home, FILE)).scenes[0]
+    here, there = (scene_order(wanted, models_here=here) for here in (True, False))
+    assert (here.make().models_here, there.make().models_here) == (True, False)  # type: ignore[attr-defined]
 
 
 def test_a_batch_plans_it(home: Path, capsys: pytest.CaptureFixture[str]) -> None:

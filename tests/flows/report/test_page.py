@@ -87,6 +87,28 @@ def test_the_verdict_and_its_reasons_come_first(page: str) -> None:
     assert "Steps: 1 executed, in 12.3 s" in top
 
 
+def test_a_failed_object_tells_what_its_earlier_steps_doubted(values: SceneValues) -> None:
+    name = values.result.refs.targets[0].name
+    values.result.outcomes += [
+        StepEvent(
+            "finished", "find_rivals", label, "desk", 0.0, outcome=outcome,
+            status=status, reasons=(reason,),
+        )
+        for label, outcome, status, reason in (
+            (name, "executed", "degraded", "its box lies on another one"),
+            (name, "cached", "ok", "one remark"),
+            ("cup", "executed", "degraded", "another one's doubt"),
+        )
+    ]  # fmt: skip
+    document = report_document(values)
+    (entry,) = document["objects"]
+    assert entry["reasons"] == [
+        "its box holds no points",
+        "find_rivals: its box lies on another one",
+    ]
+    assert "find_rivals: its box lies on another one" in report_page(values, document)
+
+
 def test_pictures_have_words_and_links_have_ends(page: str) -> None:
     pictures = re.findall(r"<img [^>]*>", page)
     assert len(pictures) >= 3
