@@ -35,7 +35,12 @@ def check_runnable(plan: list[PlanEntry], preset: Preset) -> None:
     }
     steps = {entry.step for entry in plan if entry.action == "would run"}
     for name in models_in([options[step] for step in options if step in steps]):
-        problems = found_model(name).problems
-        if problems:
-            title = "" if problems[0].startswith(name) else f"{name}: "
-            raise BadInput(f"{title}{problems[0]}")
+        check_model(name)
+
+
+def check_model(name: str) -> None:
+    """Raise BadInput if a model lacks code, weights or device here."""
+    problems = found_model(name).problems
+    if problems:
+        title = "" if problems[0].startswith(name) else f"{name}: "
+        raise BadInput(f"{title}{problems[0]}")

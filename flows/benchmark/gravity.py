@@ -36,7 +36,7 @@ class GravityBenchmark:
     scenes: int = 60
     scenes_a_step: int = 10
     curves: bool = False
-    geocalib: str = ""
+    with_geocalib: bool = False
 
 
 def compare_gravity(
@@ -57,18 +57,20 @@ def compare_gravity(
         scores: dict[str, Scored] = {}
         if config.scenes:
             scores |= score_conditions(
-                MAIN, config.scenes, config.scenes_a_step, decoder, config.geocalib
+                MAIN, config.scenes, config.scenes_a_step, decoder, config.with_geocalib
             )
         for setting, title in SETTINGS.items():
             parts = tuple(
-                _capture_errors(folder, setting == "given", decoder, config.geocalib)
+                _capture_errors(folder, setting == "given", decoder, config.with_geocalib)
                 for folder in config.captures
             )
             if parts:
                 scores[title] = joined(parts)
         curves = {}
         if config.curves:
-            curves = score_curves(config.scenes, config.scenes_a_step, decoder, config.geocalib)
+            curves = score_curves(
+                config.scenes, config.scenes_a_step, decoder, config.with_geocalib
+            )
         return scores, curves
 
     return run_training("benchmark-gravity", store, events, "local", body)
@@ -83,7 +85,7 @@ def truth_folder(capture: Path) -> Path:
 
 
 def _capture_errors(
-    folder: Path, given: bool, decoder: DecoderWeights, geocalib: str
+    folder: Path, given: bool, decoder: DecoderWeights, with_geocalib: bool
 ) -> GravityErrors:
     known = truth_folder(folder)
     truth = read_true_cameras(known)
@@ -91,7 +93,9 @@ def _capture_errors(
     photos = ingest(capture.source, Preset().ingest, label=folder.name)
     cameras = register(photos, Preset().register, label=folder.name)
     dense = reconstruct(photos, cameras, Preset().reconstruct, label=folder.name)
-    found = load(estimate_gravity(dense, decoder, geocalib, label=folder.name), GravityEstimates)
+    found = load(
+        estimate_gravity(dense, decoder, with_geocalib, label=folder.name), GravityEstimates
+    )
     down = -truth.up_in_transforms
     if not given:
         down = _true_from_estimated(load(dense, Reconstruction), truth).T @ -truth.up_world

@@ -20,7 +20,7 @@ def score_conditions(
     scenes: int,
     scenes_a_step: int,
     weights: DecoderWeights,
-    geocalib: str = "",
+    with_geocalib: bool = False,
 ) -> dict[str, Scored]:
     """Return every method's errors on the test split, by condition. Raises StepFailed."""
     jobs = [(c, first) for c in conditions for first in range(0, scenes, scenes_a_step)]
@@ -31,7 +31,7 @@ def score_conditions(
             min(scenes_a_step, scenes - job[1]),
             job[0],
             weights,
-            geocalib,
+            with_geocalib,
             label=f"{job[0].name} {job[1]}",
         ),
         jobs,
@@ -43,10 +43,10 @@ def score_conditions(
 
 
 def score_curves(
-    scenes: int, scenes_a_step: int, weights: DecoderWeights, geocalib: str = ""
+    scenes: int, scenes_a_step: int, weights: DecoderWeights, with_geocalib: bool = False
 ) -> dict[str, dict[str, Scored]]:
     """Return the errors along each robustness curve, by curve and condition."""
     return {
-        curve: score_conditions(conditions, scenes, scenes_a_step, weights, geocalib)
+        curve: score_conditions(conditions, scenes, scenes_a_step, weights, with_geocalib)
         for curve, conditions in CURVES.items()
     }

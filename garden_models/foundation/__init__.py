@@ -18,6 +18,7 @@ ADAPTERS: dict[str, str] = {
     "depth_anything_3": "garden_models.reconstruction.depth_anything_3",
     "vggt": "garden_models.reconstruction.vggt",
     "pi3": "garden_models.reconstruction.pi3",
+    "geocalib": "garden_models.photo_gravity.geocalib",
     "grounding_dino": "garden_models.targets.grounding_dino",
     "sam3": "garden_models.segmentation.sam3_tracker",
     "sam2": "garden_models.segmentation.sam2",

@@ -39,20 +39,28 @@ def configure(name: str, parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--weights", metavar="FILE", type=Path, help="a decoder (the shipped)")
     parser.add_argument(
-        "--geocalib", metavar="FILE", default="", help="GeoCalib's pinhole weights, to compare with"
+        "--geocalib",
+        action="store_true",
+        help="compare with GeoCalib as well (`garden doctor` tells what it needs)",
     )
 
 
 def run(options: argparse.Namespace) -> int:
     """Print a table for every setting; return the exit code."""
     from flows.benchmark.gravity import GravityBenchmark, compare_gravity
+    from flows.model_check import check_model
     from flows.terminal_view import TerminalView
     from garden_models.gravity.decoder.shipped import checkpoint_file
     from tasks.step import StepFailed
 
+    if options.geocalib:
+        check_model("geocalib")
     path = options.weights or checkpoint_file()
     config = GravityBenchmark(
-        tuple(options.captures), options.scenes, curves=options.curves, geocalib=options.geocalib
+        tuple(options.captures),
+        options.scenes,
+        curves=options.curves,
+        with_geocalib=options.geocalib,
     )
     try:
         with TerminalView("garden benchmark gravity") as view:

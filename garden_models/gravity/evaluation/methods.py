@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -18,6 +17,7 @@ from garden_models.gravity.decoder.checkpoint import Checkpoint, from_bytes
 from garden_models.gravity.decoder.token_layout import KIND, TOKEN_WIDTH
 from garden_models.gravity.fuse import fuse_cues
 from garden_models.gravity.protocol import Cue
+from garden_models.photo_gravity.photo_gravity import ReadPhotoGravity
 from garden_models.scene import BadGeometry, GravityEvidence, Reconstruction
 
 Method = Callable[[Reconstruction], GravityEvidence | None]
@@ -65,7 +65,9 @@ class GravityErrors:
     sigmas_deg: Float[np.ndarray, "m s"]
 
 
-def table_methods(weights: DecoderWeights, geocalib_weights: str = "") -> dict[str, Method]:
+def table_methods(
+    weights: DecoderWeights, ask_geocalib: ReadPhotoGravity | None = None
+) -> dict[str, Method]:
     """Return the methods that can run, by their names in the table."""
     methods: dict[str, Method] = {CLASSICAL: _fused_classical}
     if weights.data:
@@ -76,10 +78,9 @@ def table_methods(weights: DecoderWeights, geocalib_weights: str = "") -> dict[s
             **methods,
         }
     methods |= {name: METHODS[method] for name, method in BASELINES.items()}
-    if geocalib_weights:
-        calibrate = geocalib.load_geocalib(Path(geocalib_weights))
+    if ask_geocalib is not None:
         for name, consensus in ((GEOCALIB, False), (GEOCALIB_RANSAC, True)):
-            methods[name] = partial(geocalib.estimate, calibrate=calibrate, consensus=consensus)
+            methods[name] = partial(geocalib.estimate, predict=ask_geocalib, consensus=consensus)
     return methods
 
 

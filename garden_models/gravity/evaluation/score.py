@@ -15,6 +15,7 @@ from garden_models.gravity.evaluation.methods import (
 from garden_models.gravity.evaluation.procedural import procedural_truth
 from garden_models.gravity.training.splits import Split
 from garden_models.metrics.gravity import NO_ANSWER_DEG, MethodErrors, angular_error_deg
+from garden_models.photo_gravity.photo_gravity import ReadPhotoGravity
 from garden_models.progress import Progress, silent
 
 
@@ -24,11 +25,11 @@ def score_scenes(
     count: int,
     condition: Condition,
     weights: DecoderWeights,
-    geocalib: str = "",
+    ask_geocalib: ReadPhotoGravity | None = None,
     progress: Progress = silent,
 ) -> GravityErrors:
     """Return every method's error on the scenes ``first`` and following of a split."""
-    methods = table_methods(weights, geocalib)
+    methods = table_methods(weights, ask_geocalib)
     columns, sigmas, names = [], [], []
     for k in range(count):
         progress(k / count, f"{condition.name}, scene {first + k}")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from flows.benchmark.gravity import GravityBenchmark, compare_gravity, truth_folder
+from flows.command import main
 from flows.command.benchmark.gravity import _document
 from flows.training.gravity_record import score_rows
 from flows.wrong_use import WrongUse
@@ -31,6 +32,14 @@ def test_groups_of_scenes_become_one_row_a_method():
     assert [row["mean deg"] for row in rows] == [2.0, 12.0]
     assert [row["fail@10 %"] for row in rows] == [0.0, 50.0]
     assert rows[0]["scenes"] == 2
+
+
+def test_a_model_that_is_not_here_is_told_before_any_work(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("GARDEN_WEIGHTS", str(tmp_path / "weights"))
+    store = tmp_path / "store"
+    assert main(["benchmark", "gravity", "--geocalib", "--store", str(store)]) == 2
+    assert "geocalib" in capsys.readouterr().err
+    assert not store.exists()
 
 
 def test_the_truth_of_the_sample_is_found_in_its_folder(tmp_path):

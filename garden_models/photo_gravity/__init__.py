@@ -1,0 +1,1 @@
+"""Gravity from single photos, as models read it."""
