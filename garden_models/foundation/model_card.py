@@ -50,6 +50,9 @@ class ModelCard:
     bfloat16: bool = True
     """Whether it may run at this precision (torch's autocast)."""
 
+    own_process: bool = False
+    """Whether its code changes the process that it runs in, for all that runs beside it."""
+
     variant_key: str = ""
     variants: dict[str, Terms] = field(default_factory=dict)
 

@@ -49,6 +49,7 @@ CARD = ModelCard(
     devices=("cuda",),
     install="clone the repository and build it as its readme says, in an environment of its own",
     bfloat16=False,
+    own_process=True,  # it sets the type of every new tensor
 )
 
 WORKING_DEPTH_M = 1.0

@@ -14,7 +14,9 @@ from tasks.model.weights import stamp_of
 
 @dataclass(frozen=True)
 class Launch:
-    """One model on one device. ``stamp`` changes when its weight files do."""
+    """One model on one device. ``stamp`` changes when its weight files do; a model with
+    ``own_process`` runs in a worker, also with the Python of whoever asks it.
+    """
 
     name: str
     module: str
@@ -25,6 +27,7 @@ class Launch:
     memory_limit_gb: float | None
     dtype: Dtype
     stamp: str
+    own_process: bool = False
 
 
 def launch_of(name: str) -> Launch:
@@ -40,6 +43,7 @@ def launch_of(name: str) -> Launch:
         memory_limit_gb=settings.memory_limit_gb,
         dtype=settings.dtype,
         stamp=stamp_of(name),
+        own_process=foundation.card(name).own_process,
     )
 
 

@@ -122,7 +122,8 @@ class Residents:
 
     def _load(self, place: _Place, launch: Launch) -> Loaded:
         _clear(place)
-        made: Loaded = LoadedHere(launch) if launch.python is None else LoadedElsewhere(launch)
+        here = launch.python is None and not launch.own_process
+        made: Loaded = LoadedHere(launch) if here else LoadedElsewhere(launch)
         self.loads += 1
         place.loaded = made
         return made

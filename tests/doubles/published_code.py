@@ -33,7 +33,8 @@ from garden_models.reconstruction import da3_photos
 from tasks.model import settings
 from tasks.model.keeper_client import VARIABLE as KEEPER
 from tasks.model.resident import residents
-from tests.doubles import depth_anything_3
+from tasks.step import budget
+from tests.doubles import depth_anything_3, python_with_models
 from tests.doubles.foundation_pose_code import FoundationPoseCode
 from tests.doubles.promptable_network import PromptableNetwork
 from tests.doubles.sam3d_pipeline import Sam3dPipeline
@@ -79,28 +80,61 @@ class Models:
 def installed(folder: Path, long_side: int) -> Iterator[Models]:
     """Install all of them, with sound weights below ``folder``, on a machine with a GPU.
 
-    ``long_side`` is that of Depth-Anything-3's pictures.
+    They run in this process, but for what needs one of its own. ``long_side`` is that of
+    Depth-Anything-3's pictures.
     """
-    models = Models(folder / "weights")
-    models.folder.mkdir()
-    for name in MODELS:
-        models.put(name)
-    (folder / "models.toml").write_text(SETTINGS)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("GARDEN_WEIGHTS", str(models.folder))
-        patch.setenv("GARDEN_MODELS", str(folder / "models.toml"))
+    own_process = f"[foundation_pose]\npython = {_python(long_side)}\n"
+    with _machine(folder, SETTINGS + own_process) as (models, patch):
         patch.setenv(KEEPER, "off")
-        patch.setattr(settings, "usable_gpus", lambda: ("0",))
         patch.setattr(settings, "_torch_has_gpus", lambda: True)
         patch.setattr(da3_photos, "LONG_SIDE", long_side)
         patch.setattr(depth_anything_3, "LONG_SIDE", long_side)
-        patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
         for name, module in _packages().items():
             patch.setitem(sys.modules, name, module)
         residents.free()
         yield models
         residents.free()
         sys.modules.pop("estimater", None)
+
+
+@contextmanager
+def installed_in_workers(folder: Path, long_side: int) -> Iterator[Models]:
+    """The same, but each in another environment than this one's, where workers run it."""
+    python = _python(long_side)
+    here = SETTINGS.replace('device = "cpu"', f'device = "cpu"\npython = {python}')
+    here += "".join(
+        f"[{name}]\npython = {python}\n" for name in ("sam3d_objects", "foundation_pose")
+    )
+    with _machine(folder, here) as (models, patch):
+        patch.delenv(KEEPER, raising=False)
+        patch.setattr(budget, "usable_gpus", lambda: ("0",))
+        patch.setattr(da3_photos, "LONG_SIDE", long_side)  # of the memory that it will need
+        yield models
+
+
+@contextmanager
+def _machine(folder: Path, model_settings: str) -> Iterator[tuple[Models, pytest.MonkeyPatch]]:
+    models = Models(folder / "weights")
+    models.folder.mkdir()
+    for name in MODELS:
+        models.put(name)
+    (folder / "models.toml").write_text(model_settings)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("GARDEN_WEIGHTS", str(models.folder))
+        patch.setenv("GARDEN_MODELS", str(folder / "models.toml"))
+        patch.setattr(settings, "usable_gpus", lambda: ("0",))
+        patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+        yield models, patch
+
+
+def _python(long_side: int) -> str:
+    return json.dumps([sys.executable, python_with_models.__file__, str(long_side)])
+
+
+def install_packages(long_side: int) -> None:
+    """Install all of them in this process, for good."""
+    da3_photos.LONG_SIDE = depth_anything_3.LONG_SIDE = long_side
+    sys.modules.update(_packages())
 
 
 def _packages() -> dict[str, ModuleType]:

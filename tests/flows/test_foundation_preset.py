@@ -28,7 +28,7 @@ from garden_models.geometry.rigid import transform_points
 from garden_models.metrics.placement import PlacementError, shape_error
 from storage import Store
 from tasks.step import RunContext, run_context
-from tests.doubles.published_code import Models, installed
+from tests.doubles.published_code import Models, installed, installed_in_workers
 from tests.scenes.corner_truth import CORNER, load_corner
 
 pytest.importorskip("omegaconf")
@@ -74,15 +74,26 @@ class Site:
             return load_values(result)
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    folder = tmp_path_factory.mktemp("foundation")
+def copy_corner(folder: Path) -> None:
     (folder / "corner").mkdir()
     shutil.copytree(CORNER / "images", folder / "corner" / "images")
     shutil.copy(CORNER / "targets.json", folder / "corner")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    folder = tmp_path_factory.mktemp("foundation")
+    copy_corner(folder)
     with installed(folder, LONG_SIDE) as models:
         yield Site(folder, models)
     shutil.rmtree(folder)
+
+
+@pytest.fixture
+def site_of_workers(tmp_path: Path) -> Iterator[Site]:
+    copy_corner(tmp_path)
+    with installed_in_workers(tmp_path, LONG_SIDE) as models:
+        yield Site(tmp_path, models)
 
 
 @pytest.fixture(scope="module")
@@ -129,6 +140,20 @@ def test_the_scene_ends_ok_by_the_papers_models(report: dict[str, Any]) -> None:
     assert backend["mesh_object"] == "sam3d_objects"
     assert backend["place_object"] == "foundation_pose"
     assert report["scale"]["source"] == "metric_depth"
+
+
+def test_models_in_environments_of_their_own_give_the_same(
+    site: Site, report: dict[str, Any], site_of_workers: Site
+) -> None:
+    there = site_of_workers.factorize(*QUICKER)
+    assert there["status"] == report["status"]
+    stores = [Store.open(one.folder / "store") for one in (site, site_of_workers)]
+    for step in ("predict_geometry", "segment", "mesh_object", "place_object"):
+        for label in ("",) if step == "predict_geometry" else NAMES:
+            here, theirs = (store.latest("corner", step, label) for store in stores)
+            assert here is not None and theirs is not None
+            assert here.key == theirs.key, "where a model runs is no part of what it gives"
+            assert here.outputs["value"].content == theirs.outputs["value"].content, step
 
 
 def test_the_unit_is_the_true_metre(values: SceneValues) -> None:

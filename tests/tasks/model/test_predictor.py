@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import gc
 import random
 import weakref
@@ -14,8 +15,9 @@ import torch
 from garden_models.foundation.failure import ModelOutOfMemory
 from garden_models.scene import BadInput
 from tasks.model import predictor
-from tasks.model.resident import LoadedHere, residents
+from tasks.model.resident import LoadedElsewhere, LoadedHere, residents
 from tasks.model_worker.calling import call
+from tests.tasks.model import doubler
 from tests.tasks.model.doubler import loads, put_weights
 from tests.tasks.model.nouns import Answer, Ask, Part, Question
 
@@ -52,6 +54,15 @@ def test_another_model_takes_its_place_on_the_device(models: Path) -> None:
             assert gone() is None
             assert double(QUESTION).values[0, 0] == 2.0
     assert (loads(models / "doubler"), loads(models / "tripler")) == (2, 1)
+
+
+def test_one_that_changes_its_process_gets_one_of_its_own(
+    models: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(doubler, "CARD", dataclasses.replace(doubler.CARD, own_process=True))
+    with predictor("doubler") as predict:
+        assert predict(QUESTION).values.tolist() == [[2.0, 2.0]] * 3
+    assert isinstance(residents._places["cpu"].loaded, LoadedElsewhere)
 
 
 def test_replaced_weights_are_loaded(models: Path) -> None:
