@@ -82,7 +82,9 @@ class Ticket:
         One whose owner is killed does not ring: try again after a while.
         """
         assert self._bell is not None, "only who is in the queue waits"
-        if select.select([self._bell], [], [], seconds)[0]:
+        poll = select.poll()
+        poll.register(self._bell, select.POLLIN)
+        if poll.poll(1000 * seconds):
             os.read(self._bell, _RINGS)
 
     def give_back(self) -> None:
